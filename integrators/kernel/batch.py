@@ -270,9 +270,9 @@ class _Own(_InLanes):
     def memory(self) -> Any:
         contexts = [self.work.program.contexts()[0] for _ in range(self.lanes.width)]
         for one in contexts:
-            one.strategy = self.work.program.solver.strategy
-            one.interval = float(abs(self.work.result.t[-1] - self.work.t0))
-            self.work.program.limit(one, one.interval)
+            one.implicit.strategy = self.work.program.solver.strategy
+            one.controller.interval = float(abs(self.work.result.t[-1] - self.work.t0))
+            self.work.program.limit(one, one.controller.interval)
         group, _ = self.lanes.groups(self.work.t0, self.h, self.numbers, self.arrays)
         group.point({"contexts": np.array([one.address for one in contexts])})
         group.first_length = self.work.program.first or 0.0

@@ -12,7 +12,7 @@ from integrators.caveats import sees_kinks
 from integrators.events.event import Event
 from integrators.kernel import tables
 from integrators.kernel.batch import Batch, prepare_batch
-from integrators.kernel.context import ALWAYS_IMPLICIT, Context, Shape, blocks, width_of_blocks
+from integrators.kernel.context import Context, Shape, blocks, width_of_blocks
 from integrators.kernel.ensemble.prepared import Lanes, lanes_of
 from integrators.kernel.events.engine import look
 from integrators.kernel.events.functions import Action, EventFunction
@@ -24,6 +24,7 @@ from integrators.kernel.native import binary
 from integrators.kernel.native import field as fields
 from integrators.kernel.native.foreign import field_of
 from integrators.kernel.native.memory import aligned
+from integrators.kernel.parts.implicit import ALWAYS_IMPLICIT
 from integrators.kernel.step import fused
 from integrators.kernel.step.engine import steps
 from integrators.kernel.step.rule import (
@@ -336,10 +337,10 @@ class HBVMProgram(Compiled):
 
     def _made(self, *, side: bool) -> Context:
         tables = {**self._fixed, **({} if side else self.scaled(self.h))}
-        more = {"energy_rows": self.system.dim + 1} if self.projected else self._more
+        more = {"energy.rows": self.system.dim + 1} if self.projected else self._more
         made = self.kept.context(self.shape, tables) if self.kept else Context(self.shape, tables, more)
-        made.tolerance = TOLERANCE
-        made.log_rest = LOG_REST
+        made.solver.tolerance = TOLERANCE
+        made.solver.log_rest = LOG_REST
         return made
 
     def load(self, contexts: tuple[Context, Context], y: Array, par: Array, t0: float) -> None:
@@ -349,7 +350,11 @@ class HBVMProgram(Compiled):
         if self.second:
             velocity, speed, mass = self._velocity(par)
             for context in contexts:
-                context.velocity[: self.shape.rows], context.speed[:], context.mass[:] = velocity, speed, mass
+                (
+                    context.factors.velocity[: self.shape.rows],
+                    context.blocks.speed[:],
+                    context.blocks.mass[:],
+                ) = velocity, speed, mass
         contexts[0].h = self.h
         if self.kept:
             self.kept.load(contexts, y, par, t0)
@@ -361,7 +366,7 @@ class HBVMProgram(Compiled):
         return emit.numpy(self.system, "velocity_scale")(0.0, np.zeros(self.system.dim), par)
 
     def _velocity(self, par: Array) -> tuple[Array, Array, Array]:
-        """Return `_velocity_scale`, and `Context.speed` and `Context.mass` of blocks."""
+        """Return `_velocity_scale`, and `Blocks.speed` and `Blocks.mass` of blocks."""
         key = par.tobytes()
         known, found = self._known_velocity  # read once: another thread may replace it
         if known != key:
@@ -507,8 +512,8 @@ class AdaptiveProgram(HBVMProgram):
         """Set the longest steps of a trajectory over an interval of a certain length; 0: unknown."""
         most = math.inf if self.max_step is None else self.max_step
         part = LONGEST * interval if interval > 0.0 else math.inf
-        context.longest_blind = min(most, part)
-        context.longest = context.longest_blind if self._timed else most
+        context.controller.longest_blind = min(most, part)
+        context.controller.longest = context.controller.longest_blind if self._timed else most
 
     def breakpoints(self, par: Array) -> Array:
         """Return the times that steps end at, ascending: those given, and those of the formulas."""
@@ -530,41 +535,41 @@ class AdaptiveProgram(HBVMProgram):
     def load(self, contexts: tuple[Context, Context], y: Array, par: Array, t0: float) -> None:
         """Put what a trajectory from (t0, y) begins with into a pair of contexts."""
         super().load(contexts, y, par, t0)
-        contexts[0].next_length = self.first or 0.0
-        contexts[0].doubt_end = t0
+        contexts[0].controller.next_length = self.first or 0.0
+        contexts[0].kinks.doubt_end = t0
 
     def _made(self, *, side: bool) -> Context:
         context = super()._made(side=True)  # with a matrix of its own
-        context.log_rest = LOG_REST_VARYING
+        context.solver.log_rest = LOG_REST_VARYING
         if self._energy:
-            context.energy_code = self._energy.address
-            context.energy_width = width_of_blocks(self.system)
-            context.point({"energy_places": self.shape.places})
-            context.tolerance = max(PART_OF_TOLERANCE * self.tol, TOLERANCE)
-            context.log_rest = max(math.log2(context.tolerance), LOG_REST_VARYING)
-        context.trusted = min(TRUSTED * context.tolerance, MOST_TRUSTED)
-        context.log_trusted = math.log2(UNTESTED * context.tolerance)
-        context.point({"estimators": self._estimators, "extrapolation": self._onward})
+            context.energy.code = self._energy.address
+            context.energy.width = width_of_blocks(self.system)
+            context.point({"energy.places": self.shape.places})
+            context.solver.tolerance = max(PART_OF_TOLERANCE * self.tol, TOLERANCE)
+            context.solver.log_rest = max(math.log2(context.solver.tolerance), LOG_REST_VARYING)
+        context.solver.trusted = min(TRUSTED * context.solver.tolerance, MOST_TRUSTED)
+        context.solver.log_trusted = math.log2(UNTESTED * context.solver.tolerance)
+        context.point({"estimate.estimators": self._estimators, "tables.extrapolation": self._onward})
         context.varying = 1
-        context.error_degree = self.degree
-        context.allowed_error = self.tol
+        context.controller.error_degree = self.degree
+        context.controller.allowed_error = self.tol
         bodies = getattr(self.system, "bodies", None) is not None
-        context.least_slope = OF_A_BODY if bodies else OF_A_COMPONENT
-        context.allowed_defect = math.inf if self.defect is None else self.defect
-        context.error_aim = math.log(self.tol) / (2 * self.degree + 1) + math.log(MARGIN)
-        context.error_decay = self.tol ** (0.5 / self.degree)
+        context.estimate.least_slope = OF_A_BODY if bodies else OF_A_COMPONENT
+        context.controller.allowed_defect = math.inf if self.defect is None else self.defect
+        context.controller.error_aim = math.log(self.tol) / (2 * self.degree + 1) + math.log(MARGIN)
+        context.estimate.error_decay = self.tol ** (0.5 / self.degree)
         if self.defect is not None:
             last = self.constants.k - 1
-            context.defect_aim = math.log(self.defect) / (2 * last + 1) + math.log(MARGIN)
-            context.defect_decay = self.defect ** (0.5 / last)
-        context.doubt, context.slowest_decay = self._doubt, self._slowest
-        context.negligible = self._negligible
-        context.sides = self._sides.address if self._sides else 0
-        context.surfaces = self._surfaces
-        context.absolute[:] = self._absolute
-        context.asks = int(self.atol is None or np.any(np.greater(self.atol, 0.0)))
+            context.controller.defect_aim = math.log(self.defect) / (2 * last + 1) + math.log(MARGIN)
+            context.estimate.defect_decay = self.defect ** (0.5 / last)
+        context.kinks.doubt, context.kinks.slowest_decay = self._doubt, self._slowest
+        context.kinks.negligible = self._negligible
+        context.surfaces.code = self._sides.address if self._sides else 0
+        context.surfaces.count = self._surfaces
+        context.estimate.absolute[:] = self._absolute
+        context.estimate.asks = int(self.atol is None or np.any(np.greater(self.atol, 0.0)))
         self.limit(context, 0.0)
-        context.stop = context.length_limit = math.inf
+        context.controller.stop = context.controller.length_limit = math.inf
         return context
 
 
@@ -586,7 +591,7 @@ class ReversibleProgram(AdaptiveProgram):
         self._scale = time_scale(system.function("field"), system.n_par)
         self._pace = fields.compile_field(system, self._scale, self.constants.lanes)
         self._ordinary = AdaptiveProgram(system, k=s, s=s, tol=tol)
-        self._more = {"pace_rows": system.dim, "pace_parameters": system.n_par + 1}
+        self._more = {"pace.rows": system.dim, "pace.parameters": system.n_par + 1}
 
     @property
     def free(self) -> bool:
@@ -600,14 +605,14 @@ class ReversibleProgram(AdaptiveProgram):
 
     def _made(self, *, side: bool) -> Context:
         context = super()._made(side=side)
-        context.log_rest = LOG_REST
+        context.solver.log_rest = LOG_REST
         return context
 
     def load(self, contexts: tuple[Context, Context], y: Array, par: Array, t0: float) -> None:
         """Put what a trajectory from (t0, y) begins with into a pair of contexts."""
         super().load(contexts, y, par, t0)
         context = contexts[0]
-        context.pace = self._pace.address
+        context.pace.code = self._pace.address
         ahead = self._ordinary.start(y, par, t0).take(SCOUTED)
         states = np.concatenate([y[np.newaxis], ahead.y]).T
         times = np.append(t0, ahead.t)
@@ -616,14 +621,14 @@ class ReversibleProgram(AdaptiveProgram):
         order = np.argsort(bare)
         elapsed = np.cumsum(np.abs(np.gradient(times))[order])
         median = bare[order][np.searchsorted(elapsed, 0.5 * elapsed[-1])]  # over the time
-        context.pace_par[:] = np.append(par, median)
-        rates = rate(t0, states, context.pace_par)[0] ** 0.25
+        context.pace.par[:] = np.append(par, median)
+        rates = rate(t0, states, context.pace.par)[0] ** 0.25
         lengths = np.diff(times) * (rates[:-1] + rates[1:]) / 2.0
-        context.epsilon = min(float(np.median(lengths[len(lengths) // 8 :])), MOST_EPSILON)
+        context.pace.epsilon = min(float(np.median(lengths[len(lengths) // 8 :])), MOST_EPSILON)
 
 
 def _decays(k: int, m: int, tol: float, middle: int, looks: bool) -> tuple[float, float]:
-    """Return `Context.doubt` and `Context.slowest_decay`, which tell a smooth field from one with a kink.
+    """Return `Kinks.doubt` and `Kinks.slowest_decay`, which tell a smooth field from one with a kink.
 
     Where the error is the tolerance, coefficients of a smooth field fall off by
     ``tol^(1/2m)`` from one degree to the next. Those of a kink fall off like 1/j^2, from the

@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from operator import attrgetter
 from time import perf_counter
 from typing import Any, ClassVar, Protocol
 
@@ -16,15 +17,11 @@ from integrators.events.event import Event
 from integrators.kernel.adjoint.gradient import Adjoint, Records
 from integrators.kernel.context import (
     ACCUMULATE,
-    ALWAYS_IMPLICIT,
-    AUTO,
     BUDGET,
     DONE,
-    FOR_VECTORS,
     HALTED,
     NOT_FINITE,
     NOT_KEPT,
-    NOT_WANTED,
     SCATTERED,
     Context,
 )
@@ -36,6 +33,7 @@ from integrators.kernel.line.kept import Kept
 from integrators.kernel.native import binary, engine
 from integrators.kernel.native.memory import address
 from integrators.kernel.pace import FEWEST, Pace
+from integrators.kernel.parts.implicit import ALWAYS_IMPLICIT, AUTO, FOR_VECTORS, NOT_WANTED
 from integrators.kernel.step.engine import steps
 from integrators.kernel.tables import Constants
 from integrators.kernel.tangent.vectors import Directions, Vectors
@@ -120,21 +118,22 @@ class HBVMStepper(ABC):
 
     # What a checkpoint holds; the values matter to the next start.
     _words: ClassVar[tuple[str, ...]] = (
-        "h", "t0", "n", "length", "older_length", "solved", "age", "free", "rate",
-        "implicit", "slow", "held", "left",
-        "time_low", "next_length", "length_after", "length_behind",
-        "error_behind", "error_ahead", "defect_behind", "defect_ahead",
-        "length_limit", "kinks", "kink_end", "doubt_end",
-        "border", "border_ahead", "behind_time", "behind_low",
-        "seen", "acting", "act_time", "length_before", "acted",
-        "landing", "on_surface", "surface", "length_wanted", "behind_on_surface",
-        "epsilon", "log_density", "log_density_behind", "density_slope",
-        "interval", "restful", "blind", "rescaled", "borrowed", "asks", "energy", "energy_scale",
+        "h", "t0", "n", "length", "older_length", "solved", "blocks.age", "solver.free", "solver.rate",
+        "implicit.active", "implicit.slow", "implicit.held", "implicit.left", "time_low",
+        "controller.next_length", "controller.length_after", "controller.length_behind",
+        "controller.error_behind", "controller.error_ahead", "controller.defect_behind",
+        "controller.defect_ahead", "controller.length_limit", "kinks.count", "kinks.end", "kinks.doubt_end",
+        "kinks.border", "kinks.border_ahead", "behind.t0", "behind.time_low", "events.seen", "events.acting",
+        "events.time", "events.length_before", "events.acted", "surfaces.reached", "surfaces.on_surface",
+        "surfaces.row", "surfaces.length_wanted", "behind.on_surface", "pace.epsilon", "pace.log_density",
+        "pace.log_density_behind", "pace.density_slope", "controller.interval", "controller.restful",
+        "estimate.blind", "estimate.rescaled", "estimate.borrowed", "estimate.asks", "energy.start",
+        "energy.scale",
     )  # fmt: skip
     _arrays: ClassVar[tuple[str, ...]] = (
-        "state", "error", "next_state", "next_error", "values", "older_values", "strict", "floored",
-        "kink_places", "borders", "borders_behind", "lasts", "lasts_behind", "behind_state", "behind_error",
-        "expected",
+        "state", "error", "next_state", "next_error", "values", "older_values", "blocks.weights",
+        "blocks.floored_weights", "kinks.places", "kinks.borders", "kinks.borders_behind", "kinks.lasts",
+        "kinks.lasts_behind", "behind.state", "behind.error", "estimate.expected",
     )  # fmt: skip
     error: Exception | None = None
     """What a function of the user raised, where the status is ``USER_ERROR``."""
@@ -160,7 +159,7 @@ class HBVMStepper(ABC):
         self._status, self._reason = Status.RUNNING, ""
         self._context, self._side = program.contexts()
         program.load((self._context, self._side), y, par, t0)
-        self._context.strategy = program.solver.strategy
+        self._context.implicit.strategy = program.solver.strategy
         if program.solver.strategy == ALWAYS_IMPLICIT:
             self._take_implicit()
         self._begin(y, t0)
@@ -243,7 +242,7 @@ class HBVMStepper(ABC):
     def _begin(self, y: Array, t0: float) -> None:
         """Put the trajectory at its start."""
         ctx = self._context
-        self._uncounted = ctx.steps  # steps that are not of this trajectory
+        self._uncounted = ctx.counters.steps  # steps that are not of this trajectory
         ctx.t0 = t0
         for workspace in self._implicit or ():
             workspace.forget()
@@ -290,10 +289,10 @@ class HBVMStepper(ABC):
         """
         ctx = self._context
         return Stats(
-            steps=ctx.steps,
-            rejections=ctx.rejections,
-            evaluations=ctx.evaluations,
-            iterations=ctx.iterations,
+            steps=ctx.counters.steps,
+            rejections=ctx.counters.rejections,
+            evaluations=ctx.counters.evaluations,
+            iterations=ctx.counters.iterations,
             solver=self._solvers(),
             extra=self._extra(),
         )
@@ -301,8 +300,8 @@ class HBVMStepper(ABC):
     def _extra(self) -> dict[str, Any]:
         ctx, kept = self._context, self._program.kept
         extra: dict[str, Any] = {
-            "partial_steps": ctx.partial,
-            "restarts": ctx.restarts,
+            "partial_steps": ctx.counters.partial_steps,
+            "restarts": ctx.counters.restarts,
             "lanes": self._program.lanes,
             "form": "second" if self._program.second else "first",
         }
@@ -310,8 +309,8 @@ class HBVMStepper(ABC):
             extra.update(kept.report(ctx))
         if self._implicit is not None:
             extra["implicit"] = {
-                "steps": ctx.implicit_steps,
-                "switches": ctx.switches,
+                "steps": ctx.counters.implicit_steps,
+                "switches": ctx.counters.switches,
                 **report(*self._implicit),
             }
         if self._vectors is not None:
@@ -321,7 +320,7 @@ class HBVMStepper(ABC):
     @property
     def _solver(self) -> str:
         """Name of the iteration that is at work."""
-        if self._implicit is not None and self._context.implicit:
+        if self._implicit is not None and self._context.implicit.active:
             return self._implicit[0].name
         return "fixed-point"
 
@@ -330,8 +329,8 @@ class HBVMStepper(ABC):
         ctx = self._context
         if self._implicit is None:
             return "fixed point"
-        implicit = ctx.implicit_steps
-        fixed = int(ctx.steps + ctx.solved) - implicit
+        implicit = ctx.counters.implicit_steps
+        fixed = int(ctx.counters.steps + ctx.solved) - implicit
         always = self._program.solver.strategy == ALWAYS_IMPLICIT
         parts = [(fixed, "fixed point"), (implicit, self._implicit[0].name)]
         used = [(count, name) for count, name in parts if count > 0] or [(0, parts[always][1])]
@@ -342,10 +341,10 @@ class HBVMStepper(ABC):
         if self._implicit is None:
             self._implicit = (self._program.implicit(), self._program.implicit())
             for context, workspace in zip((self._context, self._side), self._implicit, strict=True):
-                context.solver = solver_engine.solver.code().address
-                context.solver_memory = workspace.address
-                context.busy_implicit = workspace.busy
-                context.point({"increment": workspace.increment})
+                context.implicit.code = solver_engine.solver.code().address
+                context.implicit.memory = workspace.address
+                context.implicit.busy = workspace.busy
+                context.point({"implicit.increment": workspace.increment})
             if self._vectors:
                 self._vectors.solve_by(self._implicit)
         return self._implicit
@@ -354,9 +353,9 @@ class HBVMStepper(ABC):
         """Put the implicit solver to work."""
         self._make_implicit()
         ctx = self._context
-        ctx.implicit, ctx.wanted, ctx.slow = 1, NOT_WANTED, 0
-        ctx.held = ctx.left = FIRST_HELD
-        ctx.switches += int(self._program.solver.strategy == AUTO)
+        ctx.implicit.active, ctx.implicit.wanted, ctx.implicit.slow = 1, NOT_WANTED, 0
+        ctx.implicit.held = ctx.implicit.left = FIRST_HELD
+        ctx.counters.switches += int(self._program.solver.strategy == AUTO)
 
     @one_thread
     def step(self) -> Status:
@@ -407,7 +406,7 @@ class HBVMStepper(ABC):
     def _set_step(self, h: float) -> None:
         """Set the length of the steps, and what depends on it."""
         if not self._program.varying:
-            self._context.point(self._program.scaled(h))
+            self._context.point_to(self._program.scaled(h))
         self._context.set_factors(h)
 
     def _forget(self) -> None:
@@ -418,7 +417,7 @@ class HBVMStepper(ABC):
     @property
     def _places(self) -> list[int]:
         """Words of a checkpoint."""
-        return [self._context.slots[name].place for name in self._words]
+        return [self._context.word_of[name] for name in self._words]
 
     @property
     def _kept(self) -> tuple[str, ...]:
@@ -431,7 +430,7 @@ class HBVMStepper(ABC):
         return Checkpoint(
             self._identity,
             self._context.words[self._places],
-            tuple(getattr(self._context, name).copy() for name in self._kept),
+            tuple(array.copy() for array in attrgetter(*self._kept)(self._context)),
             None if self._implicit is None else self._implicit[0].save(),
             self._taken,
             self._status,
@@ -456,7 +455,7 @@ class HBVMStepper(ABC):
             raise InputError(
                 "this checkpoint has no tangent vectors, or others; restore it before any follow."
             )
-        arrays = [getattr(self._context, name) for name in self._kept]
+        arrays = attrgetter(*self._kept)(self._context)
         sizes = len(self._places), [array.shape for array in arrays]
         if (checkpoint.words.size, [array.shape for array in checkpoint.arrays]) != sizes:
             raise InputError(
@@ -473,13 +472,13 @@ class HBVMStepper(ABC):
             self._vectors.restore(checkpoint.vectors)
         if checkpoint.stages is not None:
             self._context.stages[:] = checkpoint.stages
-        self._uncounted = self._context.steps - checkpoint.taken
+        self._uncounted = self._context.counters.steps - checkpoint.taken
         self._status, self._reason, self.error = checkpoint.status, checkpoint.reason, None
 
     @property
     def _taken(self) -> int:
         """Steps from the trajectory's start to the present; the counters keep counting after a `restore`."""
-        return self._context.steps - self._uncounted
+        return self._context.counters.steps - self._uncounted
 
     @property
     def _identity(self) -> Identity:
@@ -495,11 +494,11 @@ class HBVMStepper(ABC):
         outcome, made, why, ctx = BUDGET, 0, None, self._context
         late = perf_counter() + self.time_limit
         while outcome == BUDGET and why is None and not (made and perf_counter() > late):
-            before = ctx.steps
+            before = ctx.counters.steps
             outcome = self._call(engine.ADVANCE, between, times, out, made, self._budget(), *addresses)
             made = ctx.made
             if outcome == BUDGET:
-                why = self._ended(ctx.steps - before)
+                why = self._ended(ctx.counters.steps - before)
         if self._vectors:
             self._vectors.note(times[:made])
         return out[:made], outcome, why
@@ -517,9 +516,9 @@ class HBVMStepper(ABC):
         targets: int = 0, parts: int = 0, /,
     ) -> int:  # fmt: skip
         """Call the kernel once; put the implicit solver to work where it is wanted."""
-        if self._context.wanted == FOR_VECTORS:
+        if self._context.implicit.wanted == FOR_VECTORS:
             self._make_implicit()
-            self._context.wanted = NOT_WANTED
+            self._context.implicit.wanted = NOT_WANTED
         elif self._wants_solver:
             self._take_implicit()
         with self._pace:
@@ -550,7 +549,7 @@ class HBVMStepper(ABC):
     @property
     def _wants_solver(self) -> bool:
         """Whether the kernel has come back for the implicit solver."""
-        return self._context.wanted != NOT_WANTED
+        return self._context.implicit.wanted != NOT_WANTED
 
     def _samples(self, t: Array, y: Array, outcome: int, why: "Ended | None" = None) -> Samples:
         if why is None and outcome not in (DONE, BUDGET):
@@ -599,5 +598,5 @@ def failure(
         )
     return Status.NONLINEAR_DIVERGENCE, (
         f"the {solver} iteration did not converge in the step from t = {t!r}, "
-        f"h = {ctx.h!r} (last relative change {ctx.last:.1e}); take a smaller h."
+        f"h = {ctx.h!r} (last relative change {ctx.solver.last:.1e}); take a smaller h."
     )

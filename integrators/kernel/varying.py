@@ -6,21 +6,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from integrators.kernel.context import (
-    BUDGET,
-    DENSE,
-    DONE,
-    KINKS_KEPT,
-    LAND,
-    NOTHING,
-    SIDE,
-    SLIDING,
-    START,
-    UNDERFLOW,
-    UNSCALED,
-    Context,
-)
+from integrators.kernel.context import BUDGET, DENSE, DONE, LAND, SIDE, SLIDING, UNDERFLOW, UNSCALED, Context
 from integrators.kernel.native import engine
+from integrators.kernel.parts.kinks import KINKS_KEPT, NOTHING, START
 from integrators.kernel.step.rule import FIRST_AT_REST, RESTART, SCALE_LASTS
 from integrators.kernel.stepper import Ended, HBVMStepper, Program
 from integrators.options import SHORTEST, SMALLEST
@@ -65,13 +53,13 @@ class AdaptiveStepper(HBVMStepper):
         self._given: Array | None = None  # sizes to take where they are asked for, of one that looks ahead
         super().__init__(program, y, par, t0)
         if any(map(self._is_at, self._breakpoints.tolist())):
-            self._context.border = START
+            self._context.kinks.border = START
 
     def _extra(self) -> dict[str, Any]:
         c, context = self._program.constants, self._context
         extra = {**super()._extra(), "k": c.k, "s": c.s}
-        if found := context.kinks:
-            kept = context.kink_places.reshape(-1, 2)[: min(found, KINKS_KEPT)]
+        if found := context.kinks.count:
+            kept = context.kinks.places.reshape(-1, 2)[: min(found, KINKS_KEPT)]
             extra["kinks"] = [(float(t), float(h)) for t, h in kept]
         return extra
 
@@ -79,7 +67,7 @@ class AdaptiveStepper(HBVMStepper):
         if self._breakpoints.size or self._max_steps is not None:
             return False
         (ends, _, place, out), ctx = self._room, self._context
-        ends[0] = math.copysign(sys.float_info.max, ctx.next_length)
+        ends[0] = math.copysign(sys.float_info.max, ctx.controller.next_length)
         return self._is_one(
             self._enter(engine.WALK, ctx.address, self._side.address, SIDE, 2, place, 0, 0, 0, out, 1), BUDGET
         )
@@ -87,7 +75,7 @@ class AdaptiveStepper(HBVMStepper):
     @one_thread
     def take(self, count: int) -> Samples:
         """Take ``count`` steps and return them."""
-        ahead = self._context.next_length > 0.0
+        ahead = self._context.controller.next_length > 0.0
         return self.walk(sys.float_info.max if ahead else -sys.float_info.max, limit=count)
 
     def march(self, end: float, most: int) -> Samples:
@@ -103,54 +91,59 @@ class AdaptiveStepper(HBVMStepper):
     def _stop(self) -> float:
         """Return the next breakpoint ahead, which no step passes; infinitely far if there is none."""
         ctx, points = self._context, self._breakpoints
-        ahead = ctx.next_length > 0.0
+        ahead = ctx.controller.next_length > 0.0
         if not points.size:
             return math.inf if ahead else -math.inf
         found = points[points > self.t] if ahead else points[points < self.t][::-1]
         beyond = (point for point in found.tolist() if not self._is_at(point))
         stop = next(beyond, math.inf if ahead else -math.inf)
-        ctx.stop, ctx.breaks = stop, int(math.isfinite(stop))
+        ctx.controller.stop, ctx.controller.breaks = stop, int(math.isfinite(stop))
         return stop
 
     def _is_at(self, t: float) -> bool:
         """Whether a breakpoint is reached; as `integrators.kernel.step.vary.remaining`."""
         ctx = self._context
         rest = (t - self.t) - ctx.time_low
-        return abs(rest) <= SHORTEST * max(abs(t), abs(self.t), abs(ctx.length_behind))
+        return abs(rest) <= SHORTEST * max(abs(t), abs(self.t), abs(ctx.controller.length_behind))
 
     def _restart(self, t: float) -> None:
         """Begin anew at a breakpoint: what is known from before it says nothing about what follows."""
         ctx = self._context
         ctx.t0, ctx.time_low = t, 0.0
-        ctx.length = ctx.length_behind = 0.0
+        ctx.length = ctx.controller.length_behind = 0.0
         # The step that ended here may have been too short to be followed by one of its length.
-        length = ctx.next_length
-        ctx.next_length = math.copysign(max(abs(length), RESTART * abs(t)), length)
-        ctx.solved = ctx.age = 0
-        ctx.border = START
+        length = ctx.controller.next_length
+        ctx.controller.next_length = math.copysign(max(abs(length), RESTART * abs(t)), length)
+        ctx.solved = ctx.blocks.age = 0
+        ctx.kinks.border = START
 
     def _take_implicit(self) -> None:
         """Put the implicit solver to work; what the fixed-point iteration allowed does not bind it."""
         super()._take_implicit()
-        self._context.held = 0
-        self._context.length_limit = np.inf
+        self._context.implicit.held = 0
+        self._context.controller.length_limit = np.inf
 
     def _face(self, end: float) -> None:
         """Turn towards a time; what lay ahead is forgotten where it lies behind then."""
         ctx = self._context
         if abs(end) < sys.float_info.max:
             self._goal = end if self.destination is None else self.destination
-            ctx.interval = max(ctx.interval, abs(self._goal - self._origin), abs(end - self._origin))
-            self._program.limit(ctx, ctx.interval)
+            ctx.controller.interval = max(
+                ctx.controller.interval, abs(self._goal - self._origin), abs(end - self._origin)
+            )
+            self._program.limit(ctx, ctx.controller.interval)
         way = end - self.t
-        if way == 0.0 or not math.copysign(1.0, way) * ctx.next_length < 0.0:
+        if way == 0.0 or not math.copysign(1.0, way) * ctx.controller.next_length < 0.0:
             return
-        ctx.next_length *= -1.0
-        if ctx.pace:  # the step behind comes again
-            ctx.log_density, ctx.log_density_behind = ctx.log_density_behind, ctx.log_density
-            ctx.epsilon *= -1.0
-            ctx.next_length = ctx.epsilon * math.exp(-ctx.log_density)
-        ctx.border = NOTHING
+        ctx.controller.next_length *= -1.0
+        if ctx.pace.code:  # the step behind comes again
+            ctx.pace.log_density, ctx.pace.log_density_behind = (
+                ctx.pace.log_density_behind,
+                ctx.pace.log_density,
+            )
+            ctx.pace.epsilon *= -1.0
+            ctx.controller.next_length = ctx.pace.epsilon * math.exp(-ctx.pace.log_density)
+        ctx.kinks.border = NOTHING
         self._forget()
 
     def _to(self, times: Array, between: int) -> Samples:
@@ -163,7 +156,7 @@ class AdaptiveStepper(HBVMStepper):
         made, outcome, why = 0, DONE, None
         while made < times.size and outcome == DONE and why is None:
             stop = self._stop()
-            beyond = np.flatnonzero((times - stop) * self._context.next_length > 0.0)
+            beyond = np.flatnonzero((times - stop) * self._context.controller.next_length > 0.0)
             last = int(beyond[0]) if beyond.size and beyond[0] >= made else times.size
             piece = times[made:last]
             meets = last < times.size or times[-1] == stop
@@ -190,19 +183,21 @@ class AdaptiveStepper(HBVMStepper):
         Where errors grow, as in y' = y + f(t), what is allowed is less by as much.
         """
         ctx = self._context
-        ahead = math.copysign(1.0, ctx.next_length)
+        ahead = math.copysign(1.0, ctx.controller.next_length)
         expected = self._expected(ahead) if self._given is None else self._given
-        if not (expected > LARGER * ctx.scale).any():
-            ctx.expected[:] = 0.0
+        if not (expected > LARGER * ctx.estimate.scale).any():
+            ctx.estimate.expected[:] = 0.0
             self._in_vain *= 2
-            ctx.asks = -self._in_vain
+            ctx.estimate.asks = -self._in_vain
             return
-        ctx.expected[:] = expected
-        ctx.rescaled, ctx.age = SCALE_LASTS, 0
-        ctx.next_length = ahead * max(FIRST_AT_REST * ctx.interval, abs(ctx.next_length))
-        places = ctx.kink_places.reshape(-1, 2)[: min(ctx.kinks, KINKS_KEPT), 0]
-        if len(places) and ahead * (places[-1] - self.t) > -FIRST_AT_REST * ctx.interval:
-            ctx.kinks -= 1  # by a block's own size; if it is one by this size, it is found again
+        ctx.estimate.expected[:] = expected
+        ctx.estimate.rescaled, ctx.blocks.age = SCALE_LASTS, 0
+        ctx.controller.next_length = ahead * max(
+            FIRST_AT_REST * ctx.controller.interval, abs(ctx.controller.next_length)
+        )
+        places = ctx.kinks.places.reshape(-1, 2)[: min(ctx.kinks.count, KINKS_KEPT), 0]
+        if len(places) and ahead * (places[-1] - self.t) > -FIRST_AT_REST * ctx.controller.interval:
+            ctx.kinks.count -= 1  # by a block's own size; if it is one by this size, it is found again
 
     def _expected(self, ahead: float) -> Array:
         """Return the sizes that errors of the blocks may be relative to."""
@@ -214,7 +209,7 @@ class AdaptiveStepper(HBVMStepper):
             self._charge(scout)
         sizes = known[:, 1:].max(axis=0, initial=0.0)
         expected = self._of_blocks(sizes)
-        if (expected > LARGER * self._context.scale).any():
+        if (expected > LARGER * self._context.estimate.scale).any():
             growth = self._growth(known[-1, 0], sizes, expected)
             expected *= min(1.0, max(1.0, NOISE / self._program.tol) / growth)
         return expected
@@ -232,8 +227,8 @@ class AdaptiveStepper(HBVMStepper):
 
     def _charge(self, scout: "AdaptiveStepper") -> None:
         """Count the work of a trajectory that looks ahead as this one's."""
-        self._context.evaluations += scout.stats.evaluations or 0
-        self._context.iterations += scout.stats.iterations or 0
+        self._context.counters.evaluations += scout.stats.evaluations or 0
+        self._context.counters.iterations += scout.stats.iterations or 0
 
     def _of_blocks(self, sizes: Array) -> Array:
         """Return the largest of the sizes of components in each block."""
@@ -253,8 +248,8 @@ class AdaptiveStepper(HBVMStepper):
         found = []
         for shift in (0.0, nudge):
             scout = self._scout(self.y + shift * moved * sizes)
-            scout._given = scout._context.expected[:] = expected
-            scout._context.rescaled = SCALE_LASTS
+            scout._given = scout._context.estimate.expected[:] = expected
+            scout._context.estimate.rescaled = SCALE_LASTS
             scout._max_steps = min(MOST_COMPARED, self._max_steps or MOST_COMPARED)
             made = scout.advance(times)
             self._charge(scout)
@@ -269,8 +264,10 @@ class AdaptiveStepper(HBVMStepper):
     def only_looks(self) -> None:
         """Take steps whatever their errors are."""
         ctx = self._context
-        ctx.allowed_error = ctx.allowed_defect = ctx.error_aim = ctx.doubt = math.inf
-        ctx.asks = 0
+        ctx.controller.allowed_error = ctx.controller.allowed_defect = ctx.controller.error_aim = (
+            ctx.kinks.doubt
+        ) = math.inf
+        ctx.estimate.asks = 0
 
     def _budget(self, most: int | None = None) -> int:
         """Return how many of ``most`` steps the kernel may take at a time, and of those left."""
@@ -316,9 +313,9 @@ class AdaptiveStepper(HBVMStepper):
             n = self._budget(None if limit is None else limit - steps)
             if longest < math.inf:
                 n = min(n, 1)
-                ctx.next_length = np.clip(ctx.next_length, -longest, longest)
+                ctx.controller.next_length = np.clip(ctx.controller.next_length, -longest, longest)
             stop = self._stop()
-            passes = (end - stop) * ctx.next_length >= 0.0
+            passes = (end - stop) * ctx.controller.next_length >= 0.0
             times, out = np.full(n + 1, stop if passes else end), np.empty((n + 1, self._dim))
             if self._vectors:
                 self._vectors.room(n + 1)

@@ -59,7 +59,7 @@ def show_stages(ctx, stages, count):
     """Copy the stages of a recorded step to behind the rows of the adjoint."""
     block, behind = ctx.padded * ctx.lanes, ctx.rows * ctx.lanes
     copy_stages(stages, count, ctx.stages + behind, block, count, ctx.calls)
-    copy_stages(stages, count, ctx.old_stages + behind, block, count, ctx.calls)
+    copy_stages(stages, count, ctx.scratch.old_stages + behind, block, count, ctx.calls)
 
 
 @compiled
@@ -72,7 +72,7 @@ def add_slopes(ctx, memory, h):
         for p in range(memory.parameters):
             total = 0.0
             for i in range(used):
-                total += ctx.weights[lanes * call + i] * values[lanes * p + i]
+                total += ctx.tables.weights[lanes * call + i] * values[lanes * p + i]
             memory.found[p], low = two_sum(memory.found[p], h * total)
             memory.lost[p] += low
 
@@ -92,7 +92,7 @@ def pull(address, place):
         rewind(ctx)
         prepare(ctx)
         choose(ctx)
-        test(ctx, sweep_measured(ctx, ctx.free if ctx.predicted else 0))
+        test(ctx, sweep_measured(ctx, ctx.solver.free if ctx.solver.predicted else 0))
         outcome = settle(ctx)
         if outcome == DONE:
             outcome = finish(ctx)

@@ -99,8 +99,8 @@ class Adjoint:
             fixed["raw_matrix"] = tables.rounded(self._constants)
         fixed["extrapolation"] = tables.onward(c) if c.route > tables.THROUGH else aligned(0)
         self.context = made = Context(own, fixed, {"padded": 2 * (-(-dim // 8) * 8)})
-        made.tolerance, made.log_rest, made.varying = TOLERANCE, LOG_REST_VARYING, 1
-        made.rate = FIRST_RATE
+        made.solver.tolerance, made.solver.log_rest, made.varying = TOLERANCE, LOG_REST_VARYING, 1
+        made.solver.rate = FIRST_RATE
         made.par[:] = par
         self._wanted = parameters and system.n_par > 0
         wanted = system.n_par if self._wanted else 0

@@ -9,7 +9,8 @@ looks like a kink's) is left as it is, and marked for `integrators.kernel.ensemb
 from math import sqrt
 from typing import Any
 
-from integrators.kernel.context import (
+from integrators.kernel.ensemble.group import Group
+from integrators.kernel.parts.estimate import (
     AT_ERROR,
     BEFORE_ERROR,
     BEFORE_LAST,
@@ -19,7 +20,6 @@ from integrators.kernel.context import (
     GAMMA_3,
     LAST,
 )
-from integrators.kernel.ensemble.group import Group
 from integrators.kernel.simd.emit import DOUBLE, splat
 from integrators.kernel.simd.operations import greatest, where
 from integrators.kernel.simd.values import Condition, Value
@@ -149,7 +149,7 @@ class Control:
         self.visible = b.load(visible)
 
     def speed(self, d: Any) -> Value:
-        """Return the velocity by momentum of row d, as `Context.speed`."""
+        """Return the velocity by momentum of row d, as `Blocks.speed`."""
         w = self.w
         if not w.form.second:
             return w.one

@@ -23,5 +23,7 @@ def _run_own() -> Any:
     return run
 
 
-run_own = Engine(_run_own, "group budget", *SOURCES, "context", "tables", "step", "../running/watchdog")
+run_own = Engine(
+    _run_own, "group budget", *SOURCES, "parts", "context", "tables", "step", "../running/watchdog"
+)
 """``run_own(group, budget)``: see `integrators.kernel.ensemble.own`."""

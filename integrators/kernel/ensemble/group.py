@@ -74,7 +74,7 @@ class Group(Memory):
     doubt = Real()
     negligible = Real()  # part of a block's size that the error at a jump may be; infinite: nobody looks
     outermost = Real()  # the first node
-    ends = Array("rows", "lanes")  # the field at the end of the step behind; see `Context.borders`
+    ends = Array("rows", "lanes")  # the field at the end of the step behind; see `Kinks.borders`
     lasts = Array("rows", "lanes")  # its last coefficients there
     ends_ahead = Array("rows", "lanes")
     lasts_ahead = Array("rows", "lanes")

@@ -9,10 +9,12 @@ not pass the time of the next sample, but ends there.
 
 from math import log
 
-from integrators.kernel.context import DIVERGED, DONE, EXTRAPOLATED, FIXED_POINT, Context
+from integrators.kernel.context import DIVERGED, DONE, Context
 from integrators.kernel.ensemble.group import Group
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
+from integrators.kernel.parts.implicit import FIXED_POINT
+from integrators.kernel.parts.kinks import EXTRAPOLATED
 from integrators.kernel.simd.memory import call_steps, put, splat8
 from integrators.kernel.step.begin import FARTHEST, INFINITY
 from integrators.kernel.step.control import SHORTEST, defect_power, error_power
@@ -65,24 +67,24 @@ def load(group, lane):
         ctx.par[d] = group.all_par[parameters * i + d]
         group.par[lanes * d + lane] = ctx.par[d]
     for d in range(rows):
-        ctx.velocity[d] = group.all_velocity[rows * i + d]
-        group.velocity[lanes * d + lane] = ctx.velocity[d]
-        speed = abs(ctx.velocity[d]) if ctx.second and ctx.velocity[d] != 0.0 else 1.0
-        ctx.speed[ctx.block[d]], ctx.mass[ctx.block[d]] = speed, 1.0 / speed
+        ctx.factors.velocity[d] = group.all_velocity[rows * i + d]
+        group.velocity[lanes * d + lane] = ctx.factors.velocity[d]
+        speed = abs(ctx.factors.velocity[d]) if ctx.second and ctx.factors.velocity[d] != 0.0 else 1.0
+        ctx.blocks.speed[ctx.blocks.of_row[d]], ctx.blocks.mass[ctx.blocks.of_row[d]] = speed, 1.0 / speed
     for j in range(ctx.padded * ctx.lanes):
         ctx.values[j] = 0.0
     ctx.t0 = group.start_time
-    ctx.stop = ctx.length_limit = INFINITY
-    ctx.next_length, ctx.length_behind = group.first_length, 0.0
-    ctx.doubt_end = group.start_time
-    ctx.kinks = ctx.steps = 0
+    ctx.controller.stop = ctx.controller.length_limit = INFINITY
+    ctx.controller.next_length, ctx.controller.length_behind = group.first_length, 0.0
+    ctx.kinks.doubt_end = group.start_time
+    ctx.kinks.count = ctx.counters.steps = 0
     begin_attempts(ctx)
     reset(ctx, group.starts + group.dim * i)
     for d in range(group.dim):
         group.state[lanes * d + lane] = ctx.state[place(ctx, d)]
         group.error[lanes * d + lane] = 0.0
     if group.times[group.count - 1] < group.start_time:
-        ctx.next_length = -ctx.next_length
+        ctx.controller.next_length = -ctx.controller.next_length
     clear(group, lane)
     group.sweeps[lane], group.rate[lane] = 0.0, FIRST_RATE
     group.mark[lane] = group.start_time
@@ -96,7 +98,7 @@ def unload(group, lane, arrived):
     i = group.member[lane]
     group.arrived[i] = arrived
     group.all_sweeps[i] = int(group.sweeps[lane])
-    group.all_steps[i] = context_at(group.contexts[lane]).steps
+    group.all_steps[i] = context_at(group.contexts[lane]).counters.steps
     group.member[lane] = -1
 
 
@@ -105,8 +107,8 @@ def write(group, lane, ctx):
     """Write the samples that are at the present time; after the last one the trajectory is at its end."""
     i, dim, made = group.member[lane], group.dim, group.made[lane]
     while made < group.count:
-        ctx.stop = group.times[made]
-        if remaining(ctx, ctx.stop) != 0.0:
+        ctx.controller.stop = group.times[made]
+        if remaining(ctx, ctx.controller.stop) != 0.0:
             break
         out = group.out + dim * (group.count * i + made)
         for d in range(dim):
@@ -121,21 +123,27 @@ def write(group, lane, ctx):
 def aim(group, lane):
     """Set the length of a lane's next step; return 0 if none is short enough."""
     ctx = context_at(group.contexts[lane])
-    h, length = within(ctx, ctx.next_length), ctx.length
+    h, length = within(ctx, ctx.controller.next_length), ctx.length
     if not abs(h) > SHORTEST * abs(ctx.t0):
         return 0
     group.h[lane], group.t0[lane], group.time_low[lane] = h, ctx.t0, ctx.time_low
     # Where the step begins and how long it is on the one whose values are there; 0: on none.
     group.ratio[lane] = h / length if length != 0.0 and abs(h / length) <= FARTHEST else 0.0
-    group.begin[lane] = 0.0 if ctx.rejected else 1.0
+    group.begin[lane] = 0.0 if ctx.controller.rejected else 1.0
     group.before[lane] = group.sweeps[lane]
     group.alive[lane] = 1.0
-    group.length_behind[lane], group.length_limit[lane] = ctx.length_behind, ctx.length_limit
-    group.error_behind[lane], group.defect_behind[lane] = ctx.error_behind, ctx.defect_behind
-    group.stop[lane] = ctx.stop
-    suspect = ctx.attempts > 0 or ctx.kinks > 0 or (ctx.t0 - ctx.doubt_end) * h < 0.0
-    first = ctx.length_behind == 0.0 or h != ctx.next_length
-    group.unwatched[lane] = 0.0 if suspect or first else float(CRAWL_STEPS - ctx.steps % CRAWL_STEPS)
+    group.length_behind[lane], group.length_limit[lane] = (
+        ctx.controller.length_behind,
+        ctx.controller.length_limit,
+    )
+    group.error_behind[lane], group.defect_behind[lane] = (
+        ctx.controller.error_behind,
+        ctx.controller.defect_behind,
+    )
+    group.stop[lane] = ctx.controller.stop
+    suspect = ctx.controller.attempts > 0 or ctx.kinks.count > 0 or (ctx.t0 - ctx.kinks.doubt_end) * h < 0.0
+    first = ctx.controller.length_behind == 0.0 or h != ctx.controller.next_length
+    group.unwatched[lane] = 0.0 if suspect or first else float(CRAWL_STEPS - ctx.counters.steps % CRAWL_STEPS)
     group.since[lane] = 0.0
     return 1
 
@@ -158,20 +166,21 @@ def enter(group, lane):
 @compiled
 def catch_up(group, lane, ctx):
     """Let a lane's context know of the steps that were taken without it."""
+    controller, kinks = ctx.controller, ctx.kinks
     ctx.t0, ctx.time_low = group.t0[lane], group.time_low[lane]
-    ctx.next_length = group.h[lane]
-    ctx.length = ctx.length_behind = group.length_behind[lane]
-    ctx.error_behind, ctx.defect_behind = group.error_behind[lane], group.defect_behind[lane]
-    ctx.length_limit = group.length_limit[lane]
-    ctx.steps += int(group.since[lane])
-    ctx.slow = 0
+    controller.next_length = group.h[lane]
+    ctx.length = controller.length_behind = group.length_behind[lane]
+    controller.error_behind, controller.defect_behind = group.error_behind[lane], group.defect_behind[lane]
+    controller.length_limit = group.length_limit[lane]
+    ctx.counters.steps += int(group.since[lane])
+    ctx.implicit.slow = 0
     for d in range(group.dim):
         ctx.state[place(ctx, d)] = group.state[group.lanes * d + lane]
     for d in range(group.rows):
-        put(ctx.borders_behind, 8 * d, splat8(0.0))
-        ctx.borders_behind[8 * d] = group.ends[group.lanes * d + lane]
-        ctx.lasts_behind[d] = group.lasts[group.lanes * d + lane]
-    ctx.border = EXTRAPOLATED
+        put(kinks.borders_behind, 8 * d, splat8(0.0))
+        kinks.borders_behind[8 * d] = group.ends[group.lanes * d + lane]
+        kinks.lasts_behind[d] = group.lasts[group.lanes * d + lane]
+    kinks.border = EXTRAPOLATED
 
 
 @compiled
@@ -188,35 +197,38 @@ def settle(group, lane):
             ctx.next_state[place(ctx, d)] = group.next_state[lanes * d + lane]
             ctx.next_error[place(ctx, d)] = group.next_error[lanes * d + lane]
         for d in range(rows):
-            ctx.row_state[d] = group.state[lanes * d + lane]
+            ctx.scratch.row_state[d] = group.state[lanes * d + lane]
             for i in range(k):
                 ctx.values[ctx.lanes * d + i] = group.values[lanes * (rows * i + d) + lane]
     else:
         clear(group, lane)
     if accepts(ctx, outcome, int(group.sweeps[lane] - group.before[lane]), 0):
         step(group, lane, ctx)
-    elif ctx.kinks or ctx.attempts >= FUTILE:
+    elif ctx.kinks.count or ctx.controller.attempts >= FUTILE:
         unload(group, lane, 0)
 
 
 @compiled
 def step(group, lane, ctx):
     """Take the step of a lane, which is good enough."""
-    wanted = ctx.next_length
+    controller = ctx.controller
+    wanted = controller.next_length
     take(ctx)
     if ctx.h != wanted:  # it was to end at a sample: what comes after it need not be as short
-        ctx.length_behind = 0.0
-        if abs(ctx.next_length) < abs(wanted):
-            ctx.next_length = wanted
+        controller.length_behind = 0.0
+        if abs(controller.next_length) < abs(wanted):
+            controller.next_length = wanted
     begin_attempts(ctx)
     for d in range(group.dim):
         group.state[group.lanes * d + lane] = group.next_state[group.lanes * d + lane]
         group.error[group.lanes * d + lane] = group.next_error[group.lanes * d + lane]
     for d in range(group.rows):
         group.ends[group.lanes * d + lane] = end_behind(ctx, d)
-        group.lasts[group.lanes * d + lane] = ctx.lasts_behind[d]
+        group.lasts[group.lanes * d + lane] = ctx.kinks.lasts_behind[d]
     write(group, lane, ctx)
-    if group.member[lane] >= 0 and (ctx.slow >= HELD_BACK_STEPS or vanishes(ctx) or crawls(group, lane, ctx)):
+    if group.member[lane] >= 0 and (
+        ctx.implicit.slow >= HELD_BACK_STEPS or vanishes(ctx) or crawls(group, lane, ctx)
+    ):
         unload(group, lane, 0)
 
 
@@ -224,37 +236,38 @@ def step(group, lane, ctx):
 def vanishes(ctx):
     """Whether a state is so near 0 that its steps are solved to less and less of its size in lanes."""
     found = False
-    for g in range(ctx.group_count):
-        found = found or 0.0 < ctx.fastest[g] < SMALLEST
+    for g in range(ctx.blocks.groups):
+        found = found or 0.0 < ctx.estimate.fastest[g] < SMALLEST
     return found
 
 
 @compiled
 def crawls(group, lane, ctx):
     """Whether a trajectory does not get anywhere; see `integrators.running.watchdog`."""
-    if ctx.steps % CRAWL_STEPS:
+    if ctx.counters.steps % CRAWL_STEPS:
         return False
     mark = group.mark[lane]
     group.mark[lane] = ctx.t0
     way, left = abs(ctx.t0 - mark), abs(group.times[group.count - 1] - mark)
-    return collapsed(way, left, abs(mark - group.start_time), ctx.steps - CRAWL_STEPS)
+    return collapsed(way, left, abs(mark - group.start_time), ctx.counters.steps - CRAWL_STEPS)
 
 
 @compiled
 def share(group, ctx):
     """Let a group know what its steps are judged by."""
-    group.allowed_error, group.allowed_defect = ctx.allowed_error, ctx.allowed_defect
-    group.error_power, group.defect_power = error_power(ctx.error_degree), defect_power(ctx.k)
-    group.error_aim, group.defect_aim = ctx.error_aim, ctx.defect_aim
-    group.error_decay, group.defect_decay = ctx.error_decay, ctx.defect_decay
-    group.least_slope, group.doubt, group.busy = ctx.least_slope, ctx.doubt, BUSY
-    group.negligible = ctx.negligible if ctx.doubt < INFINITY else INFINITY
-    group.outermost = ctx.nodes[0]
-    group.longest = ctx.longest
+    controller, estimate, kinks = ctx.controller, ctx.estimate, ctx.kinks
+    group.allowed_error, group.allowed_defect = controller.allowed_error, controller.allowed_defect
+    group.error_power, group.defect_power = error_power(controller.error_degree), defect_power(ctx.k)
+    group.error_aim, group.defect_aim = controller.error_aim, controller.defect_aim
+    group.error_decay, group.defect_decay = estimate.error_decay, estimate.defect_decay
+    group.least_slope, group.doubt, group.busy = estimate.least_slope, kinks.doubt, BUSY
+    group.negligible = kinks.negligible if kinks.doubt < INFINITY else INFINITY
+    group.outermost = ctx.tables.nodes[0]
+    group.longest = controller.longest
     group.worth = INFINITY
-    if ctx.strategy != FIXED_POINT:
+    if ctx.implicit.strategy != FIXED_POINT:
         group.worth = log_worth(ctx)
-        if log(ctx.error_decay) > group.worth:
+        if log(estimate.error_decay) > group.worth:
             group.worth = -INFINITY
 
 

@@ -66,7 +66,7 @@ def end_step(ctx, search, before):
         search.due[event] = 0
     if first >= 0:
         end, kept = search.hit_times[first], before
-        ctx.act_time = end
+        ctx.events.time = end
         close = SIMULTANEOUS * abs(end)
         for i in range(before, search.hits):
             event, late = search.hit_events[i], (search.hit_times[i] - end) * search.sign
@@ -139,20 +139,20 @@ def set_state_ahead(ctx, search):
 
     It is there to see where functions go. Return whether it is finite.
     """
-    lanes, rows, values, move = ctx.lanes, ctx.rows, ctx.sums, AHEAD * ctx.next_length
+    lanes, rows, values, move = ctx.lanes, ctx.rows, ctx.scratch.sums, AHEAD * ctx.controller.next_length
     for lane in range(lanes):
         ctx.times[lane] = ctx.t0
         for d in range(rows):
             ctx.stages[lanes * d + lane] = search.step_state[d]
     call_field(ctx.field, ctx.times, ctx.stages, ctx.par, values)
-    ctx.evaluations += 1
+    ctx.counters.evaluations += 1
     finite = True
     for d in range(rows):
         slope = values[lanes * d]
         finite = finite and is_finite(slope)
         if ctx.second:
             momentum = search.step_state[rows + d]
-            search.end_state[d] = search.step_state[d] + move * (ctx.velocity[d] * momentum)
+            search.end_state[d] = search.step_state[d] + move * (ctx.factors.velocity[d] * momentum)
             search.end_state[rows + d] = momentum + move * slope
         else:
             search.end_state[d] = search.step_state[d] + move * slope
@@ -172,7 +172,7 @@ def begin_anew(ctx, search):
         before = search.values_before[event]
         search.touched[event] = NAN
         if search.due[event] and abs(value) <= noise + RESIDUE * abs(before):
-            ahead = function(ctx, search, t + AHEAD * ctx.next_length, search.end_state)
+            ahead = function(ctx, search, t + AHEAD * ctx.controller.next_length, search.end_state)
             if not finite or not abs(ahead - value) > noise:
                 return ACCUMULATE
             value = TINY * sign(ahead - value)

@@ -1,6 +1,6 @@
 """What the steps call when a step is solved: the one C function of the search for events."""
 
-from integrators.kernel.context import CHANGE, DONE, HALTED
+from integrators.kernel.context import DONE, HALTED
 from integrators.kernel.events.actions import begin_anew, change_state, end_step
 from integrators.kernel.events.chebyshev import keep_samples, keeps_away, refine, suspect, transform
 from integrators.kernel.events.memory import (
@@ -32,6 +32,7 @@ from integrators.kernel.events.value import context, forget_states, noise_at, st
 from integrators.kernel.events.zeros import find_zeros
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
+from integrators.kernel.parts.events import CHANGE
 from integrators.kernel.simd.lanes import two_sum
 from integrators.kernel.step.sample import write
 from integrators.kernel.step.sums import time_of_step
@@ -54,8 +55,8 @@ def entry(address, memory):
     search.halted = GOING
     search.raised = 0
     set_start(ctx, search)
-    if search.mode == WHOLE and ctx.acting:
-        return change_state(ctx, search) if ctx.acting == CHANGE else begin_anew(ctx, search)
+    if search.mode == WHOLE and ctx.events.acting:
+        return change_state(ctx, search) if ctx.events.acting == CHANGE else begin_anew(ctx, search)
     if search.mode == START:
         begin(ctx, search)
         return HALTED if search.raised else DONE
@@ -66,14 +67,14 @@ def entry(address, memory):
     for event in range(search.count):
         search.touched_before[event] = search.touched[event]
     search.halted = look(ctx, search)
-    if ctx.acts and search.halted == GOING and search.room - search.hits < search.count:
+    if ctx.events.act and search.halted == GOING and search.room - search.hits < search.count:
         search.halted = FULL
     if search.halted != GOING:
         search.hits = before  # what is known of a step is all or nothing
         for event in range(search.count):
             search.touched[event] = search.touched_before[event]
         return HALTED
-    if ctx.acts:
+    if ctx.events.act:
         outcome = end_step(ctx, search, before)
         if outcome == DONE:
             keep_ends(search)
@@ -145,7 +146,7 @@ def keep_ends(search):
 @compiled
 def look(ctx, search):
     """Find the events up to `Search.stop`; return GOING or why that could not be done."""
-    project(ctx, ctx.projection, ctx.groups)
+    project(ctx, ctx.tables.projection, ctx.tables.groups)
     whole(ctx, search)
     sample_first(ctx, search)
     degree = search.degree

@@ -76,10 +76,10 @@ def weigh(ctx, c, table):
 @compiled
 def combine8(ctx, row, table):
     """Return the sum of a row's coefficients times the weights in every other vector of a table."""
-    gamma, group = ctx.coefficients, 8 * ctx.padded
+    gamma, group = ctx.scratch.coefficients, 8 * ctx.padded
     total = splat8(0.0)
     for j in range(ctx.s):
-        i = ctx.first + j
+        i = ctx.tables.first + j
         total = fma(get(table, 16 * j), spread(gamma, (i // 8) * group + 8 * row + i % 8), total)
     return total
 
@@ -92,8 +92,8 @@ def interpolate8(ctx, c, table, block):
         moved = h * combine8(ctx, d, table)
         if ctx.second:
             i = 8 * (d // 4) + d % 4
-            drift = c * (ctx.drift_factor[i] * state[i])
-            bent = (ctx.row_factor[d] * h) * combine8(ctx, d, table + 8)
+            drift = c * (ctx.factors.drift[i] * state[i])
+            bent = (ctx.factors.row[d] * h) * combine8(ctx, d, table + 8)
             put(block, 8 * d, state[i + 4] + (drift + (error[i + 4] + bent)))
             put(block, 8 * (rows + d), state[i] + (error[i] + moved))
         else:

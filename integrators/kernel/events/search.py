@@ -106,9 +106,9 @@ class KernelSearch:
         if self._look(START) != DONE:
             error = self._error
             raise UserError(error) from error
-        self._context.point({"look_memory": self._memory.words})  # keeps it alive
-        self._context.look = look.code().address
-        self._context.acts, self._context.acted = int(bool(actions)), -memory.sign * np.inf
+        self._context.point({"events.memory": self._memory.words})  # keeps it alive
+        self._context.events.code = look.code().address
+        self._context.events.act, self._context.events.acted = int(bool(actions)), -memory.sign * np.inf
 
     def _make_room(self, room: int) -> None:
         self._times, self._states, self._after = np.empty(room), *np.empty((2, room, self._dim))
@@ -149,12 +149,12 @@ class KernelSearch:
             self._make_room(2 * memory.room)
         if halted in (RAISED, UNRESOLVED, UNSOLVABLE):
             self._give_up(halted)
-            return not self._context.acts  # what an action would have changed is not known any more
+            return not self._context.events.act  # what an action would have changed is not known any more
         return halted != TERMINAL
 
     def _give_up(self, halted: int) -> None:
         """Look for nothing any more, and say why; the trajectory goes on."""
-        self._context.look = 0
+        self._context.events.code = 0
         memory = self._memory
         known = f"are known up to t = {memory.known!r} only."
         if halted == RAISED:
@@ -181,10 +181,10 @@ class KernelSearch:
 
     def finish(self, end: float) -> None:
         """Look at what there is of the step ahead, which is solved, up to a time."""
-        if self._context.acts:  # the step has been looked at when it was solved
+        if self._context.events.act:  # the step has been looked at when it was solved
             return
         self._memory.goal = end
-        while self._context.look and self._look(PART) != DONE and self.attend():
+        while self._context.events.code and self._look(PART) != DONE and self.attend():
             pass
 
     @property
@@ -211,7 +211,7 @@ class KernelSearch:
         self._hits.load(kept["hits"])
         self.trouble = kept["trouble"]
         if self.trouble is not None:
-            self._context.look = 0
+            self._context.events.code = 0
 
     def work(self) -> dict[str, int]:
         """Return what the search has cost."""

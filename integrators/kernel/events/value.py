@@ -58,12 +58,13 @@ def state_at(ctx, search, t):
     search.part = part_at(search, t)
     side = context(search.side)
     outcome = call_part(search.steps, PART, search.own, search.side, search.asked, state)
-    ctx.wanted = 0  # a partial step that only the implicit solver would solve is none: steps do not change
-    search.iterations += side.iterations
-    search.evaluations += side.evaluations
+    # A partial step that only the implicit solver would solve is none: steps do not change.
+    ctx.implicit.wanted = 0
+    search.iterations += side.counters.iterations
+    search.evaluations += side.counters.evaluations
     search.partial += 1
     search.part_known = search.part if outcome == DONE else 0.0
-    side.iterations = side.evaluations = side.restarts = 0
+    side.counters.iterations = side.counters.evaluations = side.counters.restarts = 0
     if outcome != DONE:
         for d in range(search.dim):
             state[d] = NAN

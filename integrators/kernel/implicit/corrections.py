@@ -145,7 +145,7 @@ def full(ctx, m, above):
                 for j in range(s):
                     found += m.x[i, j] * x[j * rows + d]
                 place = at(m, i, above + d)
-                m.correction[place] = m.residual[place] + ctx.row_factor[above + d] * found
+                m.correction[place] = m.residual[place] + ctx.factors.row[above + d] * found
     return True
 
 
@@ -196,5 +196,5 @@ def correct(ctx, m, which):
         return DIVERGED if is_finite(address(m.entries), m.entries.size) else NOT_FINITE
     for i in range(0, m.parts * m.block, 8):
         put(m.gamma, i, get(m.gamma, i) + get(m.correction, i))
-    ctx.stages, ctx.old_stages = ctx.old_stages, ctx.stages
+    ctx.stages, ctx.scratch.old_stages = ctx.scratch.old_stages, ctx.stages
     return DONE

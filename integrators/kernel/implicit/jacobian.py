@@ -173,7 +173,7 @@ def resolve(ctx, m, group):
         put(last, i, get(x, i))
     if ctx.second:
         z, w = get(m.eigen, 16 * group), get(m.eigen, 16 * group + 8)
-        slopes = ctx.row_factor
+        slopes = ctx.factors.row
         for d in range(rows):
             kh, a, b = spread(slopes, d), get(x, 8 * d), get(y, 8 * d)
             put(v, 8 * d, fma(kh, fma(z, a, -w * b), get(v, 8 * d)))

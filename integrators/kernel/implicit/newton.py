@@ -1,6 +1,6 @@
 """A step by an implicit solver: which start, which Jacobian, when to stop, when to give up."""
 
-from integrators.kernel.context import AUTO, BY_INCREMENT, DIVERGED, DONE, RUNNING, SCATTERED
+from integrators.kernel.context import BY_INCREMENT, DIVERGED, DONE, RUNNING, SCATTERED
 from integrators.kernel.implicit.constants import BLENDED, NEWTON
 from integrators.kernel.implicit.corrections import EACH, KEPT, correct, take_stage
 from integrators.kernel.implicit.jacobian import contraction, linearize
@@ -17,6 +17,7 @@ from integrators.kernel.implicit.stages import (
     set_velocities,
 )  # fmt: skip
 from integrators.kernel.native.jit import compiled
+from integrators.kernel.parts.implicit import AUTO
 from integrators.kernel.simd.memory import get, largest, put, splat8, spread
 from integrators.kernel.step.begin import FARTHEST, INFINITY, prepare, start_elsewhere
 from integrators.kernel.step.rule import STAGNATION
@@ -45,7 +46,7 @@ def iterate(ctx, m, which):
     one at which the field or its Jacobian is not finite.
     """
     most = MOST_BLENDED if m.method == BLENDED else MOST_CORRECTIONS
-    tolerance = ctx.tolerance
+    tolerance = ctx.solver.tolerance
     best, rough, worst = INFINITY, INFINITY, 0.0
     rate = m.rate if m.method == NEWTON and which == KEPT else 1.0
     stalled, hopeless = 0, 0
@@ -90,7 +91,7 @@ def iterate(ctx, m, which):
 def nearer(ctx, m):
     """Whether the extrapolated coefficients were nearer to the solution than constant stages."""
     far, still = splat8(0.0), splat8(0.0)
-    scale = ctx.floored
+    scale = ctx.blocks.floored_weights
     for d in range(ctx.rows):
         for group in range(m.groups):
             i = 8 * (m.padded * group + d)
@@ -111,7 +112,7 @@ def renew(ctx, m):
         linearize(ctx, m, ctx.times[0])
     else:
         for d in range(m.state.size):
-            m.state[d] = ctx.row_state[d]
+            m.state[d] = ctx.scratch.row_state[d]
         linearize(ctx, m, ctx.t0 + ctx.n * ctx.h)
     m.contraction = m.radius * contraction(m)
     m.contraction_h = ctx.h
@@ -151,6 +152,7 @@ def solve_step(ctx, m, started):
         1: the context is prepared and, if it is predicted, holds the extrapolated values, as for
         partial steps, which leave nothing to later ones. 0: a step of the trajectory.
     """
+    solver, counters, implicit = ctx.solver, ctx.counters, ctx.implicit
     m.tried = 0
     jacobians = m.jacobians
     h = ctx.h
@@ -159,11 +161,11 @@ def solve_step(ctx, m, started):
     else:
         prepare(ctx)
         length = ctx.length
-        ctx.predicted = 0
+        solver.predicted = 0
         if length != 0.0 and abs(h / length) <= FARTHEST:
-            start_elsewhere(ctx, ctx, 0.0 if ctx.rejected else 1.0, h / length)
+            start_elsewhere(ctx, ctx, 0.0 if ctx.controller.rejected else 1.0, h / length)
     set_factor(ctx, m)
-    extrapolated = ctx.predicted
+    extrapolated = solver.predicted
     if extrapolated:
         project(ctx, m, m.predicted)
         if ctx.second:
@@ -185,7 +187,7 @@ def solve_step(ctx, m, started):
             # First without what may have been bad: the extrapolation, an old Jacobian; then
             # with the Jacobian of each stage, or where that is too large, of their mean.
             if use:
-                ctx.restarts += 1
+                counters.restarts += 1
             if use or m.since:
                 trying, use, fresh = 1, 0, True
             elif outcome == DIVERGED and which == KEPT and (m.trajectory == 0 or m.source != 0):
@@ -201,17 +203,17 @@ def solve_step(ctx, m, started):
             m.predict = 1 if extrapolated == 0 or nearer(ctx, m) else 0
         set_values(ctx, m)
         ctx.solved = BY_INCREMENT
-    if not started and ctx.strategy == AUTO:
-        ctx.left -= 1
+    if not started and implicit.strategy == AUTO:
+        implicit.left -= 1
         longer = abs(h / m.contraction_h)
         if ctx.second:
             longer *= longer
-        if ctx.left < 0 and longer * m.contraction < GENTLE:
-            ctx.implicit = 0
-    ctx.last = m.change
+        if implicit.left < 0 and longer * m.contraction < GENTLE:
+            implicit.active = 0
+    solver.last = m.change
     m.corrections += m.tried
-    ctx.iterations += m.tried
-    ctx.evaluations += m.tried * ctx.k
+    counters.iterations += m.tried
+    counters.evaluations += m.tried * ctx.k
     if m.source == 0:
-        ctx.evaluations += (m.jacobians - jacobians) * (1 + ctx.rows)
+        counters.evaluations += (m.jacobians - jacobians) * (1 + ctx.rows)
     return outcome

@@ -35,15 +35,16 @@ def set_stages(ctx, m):
     The second-order form takes the coefficients of q' here, not those of p': sums
     such as q + c h q' + h^2 (...) cancel where a step spans many oscillations.
     """
+    scratch = ctx.scratch
     rows, padded = ctx.rows, ctx.padded
     lanes, chunks = ctx.lanes, ctx.chunks
     for i in range(0, m.block, 8):
         put(m.moving, 8 * padded + i, get(m.gamma, i))
     for i in range(0, 8 * padded, 8):  # for the low parts of the table's first columns
         put(m.moving, i, get(m.gamma, i))
-    moves = ctx.sums
+    moves = scratch.sums
     multiply(m.stage_table, chunks, m.groups + 1, m.moving, 8, moves, lanes, rows, padded)
-    state, error = ctx.row_state, ctx.row_error
+    state, error = scratch.row_state, scratch.row_error
     h = splat8(ctx.h)
     for chunk in range(chunks):
         start = offset(ctx, chunk)
@@ -65,7 +66,7 @@ def set_velocities(ctx, m, source, target):
     """Set the coefficients of q' in ``target``, in the second-order form, from those of p' in ``source``."""
     rows, padded = ctx.rows, ctx.padded
     h = ctx.h
-    drift, low, slope = ctx.row_drift, ctx.row_drift_low, ctx.row_factor
+    drift, low, slope = ctx.scratch.row_drift, ctx.scratch.row_drift_low, ctx.factors.row
     multiply(m.derivatives, m.groups, m.groups, source + m.block, 8, target, 8, rows, padded)
     for d in range(rows):
         for group in range(m.groups):
@@ -103,7 +104,7 @@ def set_factor(ctx, m):
     """Set what the Jacobian's columns are multiplied by."""
     h = ctx.h
     second = ctx.second
-    row_factor = ctx.row_factor
+    row_factor = ctx.factors.row
     for d in range(ctx.rows):
         m.factor[d] = h * row_factor[d] if second else h
 
@@ -115,15 +116,16 @@ def measure(ctx, m):
     In the second-order form the velocities too, which may be far from converged where
     the positions of a short step are not.
     """
+    blocks = ctx.blocks
     forget_sizes(ctx)
     for d in range(ctx.rows):
-        enter_size(ctx, d, stage_size(ctx, d, splat8(abs(ctx.row_state[d]))))
-    invert_sizes(ctx, ctx.strict, ctx.floored)
-    ctx.age = 0  # the fixed point is to measure anew
+        enter_size(ctx, d, stage_size(ctx, d, splat8(abs(ctx.scratch.row_state[d]))))
+    invert_sizes(ctx, blocks.weights, blocks.floored_weights)
+    blocks.age = 0  # the fixed point is to measure anew
     if ctx.second:
         forget_sizes(ctx)
         for d in range(ctx.rows):
-            drift = abs(ctx.row_drift[d])
+            drift = abs(ctx.scratch.row_drift[d])
             enter_size(ctx, d, max(drift, abs(m.factor[d] * m.gamma[m.block + 8 * d])))
         invert_sizes(ctx, address(m.slope_strict), address(m.slope_floored))
 
@@ -131,7 +133,7 @@ def measure(ctx, m):
 @compiled
 def changes(ctx, m, kind):
     """Return the largest change by the last correction, relative to blocks, small ones raised or not."""
-    found = change(ctx, ctx.strict if kind == STRICT else ctx.floored)
+    found = change(ctx, ctx.blocks.weights if kind == STRICT else ctx.blocks.floored_weights)
     if ctx.second:
         top = splat8(found)
         for d in range(ctx.rows):

@@ -6,12 +6,13 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from integrators.kernel.context import ALWAYS_IMPLICIT, AUTO, FIXED_POINT, Shape
+from integrators.kernel.context import Shape
 from integrators.kernel.implicit.constants import BLENDED, NEWTON, method, solver_of
 from integrators.kernel.implicit.factors import Factors
 from integrators.kernel.native import binary, store
 from integrators.kernel.native import field as fields
 from integrators.kernel.native.memory import Array, Integer, Memory, Real, Table, aligned
+from integrators.kernel.parts.implicit import ALWAYS_IMPLICIT, AUTO, FIXED_POINT
 from integrators.kernel.tables import packed
 from problems import emit
 from problems.calculus.jacobian import Jacobian

@@ -58,7 +58,7 @@ def end(ctx):
     several = ctx.mode == INVARIANTS
     values = ctx.found if several else ctx.values
     block = lanes * (ctx.every if several else ctx.padded)
-    weights, weights_low, state, error = ctx.weights, ctx.weights_low, ctx.state, ctx.error
+    weights, weights_low, state, error = ctx.tables.weights, ctx.tables.weights_low, ctx.state, ctx.error
     damage = 0.0
     for d in range(ctx.rows):
         mean, low = 0.0, 0.0

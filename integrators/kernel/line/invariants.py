@@ -94,7 +94,7 @@ def set_gram(ctx):
 @compiled
 def set_right(ctx):
     """Set r."""
-    lanes, dim, terms, weights = ctx.lanes, ctx.rows, ctx.terms, ctx.weights
+    lanes, dim, terms, weights = ctx.lanes, ctx.rows, ctx.terms, ctx.tables.weights
     width = dim * (1 + ctx.invariants)
     for chunk in range(ctx.chunks):
         found, rest = ctx.found + row(ctx, chunk), ctx.rest + row(ctx, chunk)
@@ -197,7 +197,7 @@ def find_change(ctx, threshold):
     Its gradient along the field, summed over the stages, is compared with the sum
     of the absolute values of the terms; their ratio is left in `LineContext.defect`.
     """
-    terms, weights, lanes, dim = ctx.terms, ctx.weights, ctx.lanes, ctx.rows
+    terms, weights, lanes, dim = ctx.terms, ctx.tables.weights, ctx.lanes, ctx.rows
     for a in range(ctx.invariants):
         size = 0.0
         for d in range(dim):

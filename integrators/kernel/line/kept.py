@@ -81,7 +81,7 @@ class Kept:
 
     def context(self, shape: Shape, tables: dict[str, Array]) -> LineContext:
         """Return fresh memory for a trajectory."""
-        return LineContext(shape, {**tables, **self._tables}, self._numbers)
+        return LineContext(shape, tables, self._numbers, self._tables)
 
     def share(self, own: Context, side: Context) -> None:
         """Let partial steps keep what the steps do."""

@@ -1,4 +1,4 @@
-"""The slots of a `Memory` as attributes in compiled code: ``ctx.h``, ``ctx.rows = n``, ``ctx.stages[i]``."""
+"""Slots of a `Memory` as attributes in compiled code: ``ctx.h``, ``ctx.solver.rate``, ``ctx.stages[i]``."""
 
 from typing import Any
 
@@ -14,16 +14,16 @@ from numba.extending import (
 )
 from numba.np import arrayobj
 
-from integrators.kernel.native.memory import Integer, Memory, Real, Table
+from integrators.kernel.native.memory import Integer, Memory, Part, Real, Table
 from integrators.kernel.simd.emit import INTEGER
 from integrators.kernel.simd.lanes import intrinsic
 from integrators.kernel.simd.views import DOUBLES, INTEGERS
 
 
 class MemoryType(types.Type):
-    """The address of a `Memory` of one class."""
+    """The address of a `Memory` of one class, or of a `Part`."""
 
-    def __init__(self, declared: type[Memory]):
+    def __init__(self, declared: type[Memory | Part]):
         self.declared = declared
         super().__init__(name=f"Memory({declared.__module__}.{declared.__qualname__})")
 
@@ -51,7 +51,10 @@ class _Attributes(AttributeTemplate):
 
     def generic_resolve(self, typ: Any, attr: str) -> Any:
         slot = typ.declared.slots.get(attr)
-        return None if slot is None else _kind(slot)
+        if slot is None:
+            part = typ.declared.part_of.get(attr)
+            return None if part is None else MemoryType(part.declared)
+        return _kind(slot)
 
 
 def _word(context: Any, builder: Any, memory: Any, slot: Any, kind: Any) -> Any:
@@ -62,6 +65,8 @@ def _word(context: Any, builder: Any, memory: Any, slot: Any, kind: Any) -> Any:
 
 @lower_getattr_generic(MemoryType)
 def _get(context, builder, typ, value, attr):
+    if attr in typ.declared.part_of:
+        return builder.gep(value, [ir.Constant(INTEGER, typ.declared.part_of[attr].place)])
     slot = typ.declared.slots[attr]
     kind = _kind(slot)
     if not isinstance(slot, Table):

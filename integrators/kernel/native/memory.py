@@ -14,13 +14,17 @@ makes them attributes of its address:
     @compiled
     def drift(orbit):                   # machine code: two loads at constant places
         return orbit.h * orbit.state[0]
+
+Slots of one idea make a `Part`, which a memory has among its own as ``solver = Within(Solver)``:
+``orbit.solver.rate`` is a number at a constant place too, and what is called with ``orbit.solver`` reads
+nothing else.
 """
 
 import ctypes
 from collections.abc import Mapping
 from math import prod
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any, ClassVar, Self, overload
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,7 +59,7 @@ class Slot:
 
     name: str
     place: int
-    """Which word it is."""
+    """Which word it is of what declares it."""
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
@@ -71,7 +75,7 @@ class Number(Slot, property):
         self.name = name
         property.__init__(self, attrgetter(f"numbers.{name}"), self._write)
 
-    def _write(self, memory: "Memory", value: float) -> None:
+    def _write(self, memory: "_Slots", value: float) -> None:
         raise NotImplementedError
 
 
@@ -85,13 +89,13 @@ class Integer(Number):
         @overload
         def __get__(self, memory: None, owner: type) -> Self: ...
         @overload
-        def __get__(self, memory: "Memory", owner: type) -> int: ...
+        def __get__(self, memory: "_Slots", owner: type) -> int: ...
         def __get__(  # type: ignore[override]
-            self, memory: "Memory | None", owner: type
+            self, memory: "_Slots | None", owner: type
         ) -> "Self | int": ...
-        def __set__(self, memory: "Memory", value: int) -> None: ...
+        def __set__(self, memory: "_Slots", value: int) -> None: ...
 
-    def _write(self, memory: "Memory", value: float) -> None:
+    def _write(self, memory: "_Slots", value: float) -> None:
         memory.words[self.place] = value
 
 
@@ -105,13 +109,13 @@ class Real(Number):
         @overload
         def __get__(self, memory: None, owner: type) -> Self: ...
         @overload
-        def __get__(self, memory: "Memory", owner: type) -> float: ...
+        def __get__(self, memory: "_Slots", owner: type) -> float: ...
         def __get__(  # type: ignore[override]
-            self, memory: "Memory | None", owner: type
+            self, memory: "_Slots | None", owner: type
         ) -> "Self | float": ...
-        def __set__(self, memory: "Memory", value: float) -> None: ...
+        def __set__(self, memory: "_Slots", value: float) -> None: ...
 
-    def _write(self, memory: "Memory", value: float) -> None:
+    def _write(self, memory: "_Slots", value: float) -> None:
         memory.reals[self.place] = value
 
 
@@ -123,8 +127,8 @@ class Array(Slot):
     Parameters
     ----------
     *shape : int or str
-        Numbers, or names of `Integer` slots; their product is the length. None: the array is
-        `Memory.point`\ ed to.
+        Numbers, or names of `Integer` slots, of the same part or of the memory; their product is the length.
+        None: the array is `Memory.point`\ ed to.
     of : {float, int}
         What it holds.
     """
@@ -135,14 +139,14 @@ class Array(Slot):
     @overload
     def __get__(self, memory: None, owner: type) -> Self: ...
     @overload
-    def __get__(self, memory: "Memory", owner: type) -> Any: ...
-    def __get__(self, memory: "Memory | None", owner: type) -> Any:
+    def __get__(self, memory: "_Slots", owner: type) -> Any: ...
+    def __get__(self, memory: "_Slots | None", owner: type) -> Any:
         if memory is None:
             return self
+        if (pointed := memory._pointed.get(memory._first + self.place)) is not None:
+            return pointed
         # Compiled code may have exchanged it for another.
-        if self.name in memory._pointed:
-            return memory._pointed[self.name]
-        start = (int(memory.words[self.place]) - memory.address) // 8
+        start = memory._first + (int(memory.words[self.place]) - memory.address) // 8
         found = memory._memory[start : memory._ends[start]]
         return found if self.of is float else found.view(np.int64)
 
@@ -151,8 +155,87 @@ class Table(Array):
     """An `Array` that compiled code sees as numba's own array, with its shape: ``x[i, j]``, ``x.shape``."""
 
 
-class Memory:
+Declared = TypeVar("Declared", bound="Part")
+
+
+class Within(Generic[Declared]):
+    """Where a memory has a part."""
+
+    name: str
+    place: int
+
+    def __init__(self, declared: type[Declared]):
+        self.declared = declared
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+
+    @overload
+    def __get__(self, memory: None, owner: type) -> type[Declared]: ...
+    @overload
+    def __get__(self, memory: "Memory", owner: type) -> Declared: ...
+    def __get__(self, memory: "Memory | None", owner: type) -> Any:
+        if memory is None:
+            return self.declared
+        made = vars(memory)[self.name] = self.declared(memory, self)  # what is looked up the next time
+        return made
+
+
+class _Slots:
+    """What declares slots and parts, in the order in which their words lie."""
+
+    slots: ClassVar[dict[str, Slot]] = {}
+    part_of: ClassVar[dict[str, "Within[Any]"]] = {}
+    _size: ClassVar[int] = 0
+    """How many words these are."""
+    _structure: ClassVar[Any]
+
+    _first = 0  # which word of the memory is the first of these
+    _pointed: dict[int, NDArray[Any]]  # arrays that are pointed to, by the word in the memory
+    _memory: Numbers
+    _ends: dict[int, int]
+    address: int
+    numbers: Any
+    reals: Numbers
+    words: Integers
+
+    def __init_subclass__(cls) -> None:
+        own = {name: one for name, one in vars(cls).items() if isinstance(one, Slot | Within)}
+        if twice := sorted(own.keys() & (cls.slots.keys() | cls.part_of.keys())):
+            raise TypeError(f"{cls.__name__} declares again what its base has: {', '.join(twice)}.")
+        slots, parts, fields = dict(cls.slots), dict(cls.part_of), []
+        for name, one in own.items():
+            one.place = cls._size
+            if isinstance(one, Slot):
+                slots[name] = one
+                cls._size += 1
+                fields.append((name, getattr(one, "kind", ctypes.c_int64)))
+            else:
+                parts[name] = one
+                cls._size += one.declared._size
+                fields.append((name, one.declared._structure))
+        cls.slots, cls.part_of = slots, parts
+        base = getattr(cls, "_structure", ctypes.Structure)
+        # whose fields are read at once
+        cls._structure = type(f"{cls.__name__}Numbers", (base,), {"_fields_": fields})
+
+
+class Part(_Slots):
+    """Slots of one idea, which lie side by side in a `Memory`."""
+
+    def __init__(self, memory: "Memory", within: "Within[Any]"):
+        self._first = within.place
+        end = within.place + self._size
+        self.words, self.reals = memory.words[within.place : end], memory.reals[within.place : end]
+        self.numbers = getattr(memory.numbers, within.name)
+        self.address = memory.address + 8 * within.place
+        self._memory, self._ends, self._pointed = memory._memory, memory._ends, memory._pointed
+
+
+class Memory(_Slots):
     """Slots, and the arrays that belong to them, in one piece of memory.
+
+    Slots of parts are named like ``"solver.rate"``.
 
     Parameters
     ----------
@@ -171,59 +254,53 @@ class Memory:
         For compiled functions.
     """
 
-    slots: ClassVar[dict[str, Slot]] = {}
-    _numbers: ClassVar[Any] = None
+    word_of: ClassVar[dict[str, int]] = {}
+    """The word of each slot, those of parts too."""
+    _all: ClassVar[dict[str, Slot]] = {}
 
     def __init_subclass__(cls) -> None:
-        own = {name: slot for name, slot in vars(cls).items() if isinstance(slot, Slot)}
-        if twice := sorted(own.keys() & cls.slots.keys()):
-            raise TypeError(f"{cls.__name__} declares again what its base has: {', '.join(twice)}.")
-        for place, slot in enumerate(own.values(), len(cls.slots)):
-            slot.place = place
-        cls.slots = {**cls.slots, **own}
-        cls._numbers = None
-
-    @classmethod
-    def _as_numbers(cls) -> Any:
-        """Return the slots as a structure of `ctypes`, whose fields are read at once."""
-        if cls._numbers is None:
-            fields = [(name, getattr(slot, "kind", ctypes.c_int64)) for name, slot in cls.slots.items()]
-            cls._numbers = type(f"{cls.__name__}Numbers", (ctypes.Structure,), {"_fields_": fields})
-        return cls._numbers
+        super().__init_subclass__()
+        cls._all, cls.word_of = dict(cls.slots), {name: slot.place for name, slot in cls.slots.items()}
+        for part in cls.part_of.values():
+            for name, slot in part.declared.slots.items():
+                cls._all[f"{part.name}.{name}"] = slot
+                cls.word_of[f"{part.name}.{name}"] = part.place + slot.place
 
     def __init__(self, numbers: Mapping[str, float], arrays: Mapping[str, NDArray[Any]]):
-        def length(slot: Array) -> int:
-            return prod(int(numbers[n]) if isinstance(n, str) else n for n in slot.shape)
+        def size(n: int | str, part: str) -> int:
+            return n if isinstance(n, int) else int(numbers[part + n if part + n in self.word_of else n])
 
-        end = -(-len(self.slots) // LINE) * LINE
+        end = -(-self._size // LINE) * LINE
         self._own: dict[str, tuple[int, int]] = {}  # where an array begins and ends
         self._ends: dict[int, int] = {}  # the same, for all that were ever its own
-        for name, slot in self.slots.items():
+        for name, slot in self._all.items():
             if isinstance(slot, Array) and slot.shape and name not in arrays:
-                self._own[name] = (end, end + length(slot))
-                self._ends[end] = end + length(slot)
-                end += -(-max(length(slot), 1) // LINE) * LINE
-        self._structure = self._as_numbers()
+                length = prod(size(n, name.removesuffix(slot.name)) for n in slot.shape)
+                self._own[name] = (end, end + length)
+                self._ends[end] = end + length
+                end += -(-max(length, 1) // LINE) * LINE
         self._lies_in(aligned(end))
         for name, (start, _) in self._own.items():
-            self.words[self.slots[name].place] = self.address + 8 * start
+            self.words[self.word_of[name]] = self.address + 8 * start
         for name, value in numbers.items():
-            setattr(self, name, value)
+            (self.reals if isinstance(self._all[name], Real) else self.words)[self.word_of[name]] = value
         self._find_places()
-        self._pointed: dict[str, NDArray[Any]] = {}
+        self._pointed = {}
         self.point(arrays)
 
     def _lies_in(self, memory: Numbers) -> None:
         self._memory = memory
-        self.reals: Numbers = memory[: len(self.slots)]
-        self.words: Integers = self.reals.view(np.int64)
+        self.reals = memory[: self._size]
+        self.words = self.reals.view(np.int64)
         self.numbers = self._structure.from_buffer(memory)
-        self.address: int = ctypes.addressof(self.numbers)
+        self.address = ctypes.addressof(self.numbers)
 
     def copy(self) -> Self:
         """Return memory of its own with the same content, which points to the same arrays."""
         other = object.__new__(type(self))
         vars(other).update(vars(self))
+        for part in self.part_of:  # which are this one's
+            vars(other).pop(part, None)
         other._pointed = self._pointed.copy()
         memory = _from_a_line_on(np.empty(self._memory.size + LINE))
         memory[:] = self._memory
@@ -234,12 +311,13 @@ class Memory:
     def point(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Let slots point to arrays, and keep these alive."""
         for name, array in arrays.items():
-            self._pointed[name] = array
-            self.words[self.slots[name].place] = address(array)
+            place = self.word_of[name]
+            self._pointed[place] = array
+            self.words[place] = address(array)
         if not self._own.keys().isdisjoint(arrays):
             self._own = {name: part for name, part in self._own.items() if name not in arrays}
             self._find_places()
 
     def _find_places(self) -> None:
         # of the addresses in this memory, which are others in a copy
-        self._places = np.array([self.slots[name].place for name in self._own], dtype=np.intp)
+        self._places = np.array([self.word_of[name] for name in self._own], dtype=np.intp)

@@ -23,23 +23,24 @@ def solve(ctx):
     """Solve the step ahead, unless that is done; return the outcome."""
     if ctx.solved:
         return DONE
-    if ctx.implicit:
+    if ctx.implicit.active:
         return solve_implicitly(ctx, ctx, 0)
     begin(ctx)
-    test(ctx, sweep_measured(ctx, ctx.free if ctx.predicted else 0))
+    test(ctx, sweep_measured(ctx, ctx.solver.free if ctx.solver.predicted else 0))
     return reconsider(ctx, settle(ctx))
 
 
 @compiled
 def watched(ctx):
     """Whether anybody wants to see each step before it is taken, and so no step that is undone."""
-    return ctx.look != 0 or ctx.follow != 0
+    return ctx.events.code != 0 or ctx.follow != 0
 
 
 @compiled
 def looked(ctx):
     """Look for events in the step ahead, and let vectors follow it, if anybody wants that; the outcome."""
-    outcome = call_look(ctx.look, ctx, ctx.look_memory) if ctx.look and ctx.acts == 0 else DONE
+    events = ctx.events
+    outcome = call_look(events.code, ctx, events.memory) if events.code and events.act == 0 else DONE
     if outcome == DONE and ctx.follow:
         outcome = call_follow(ctx.follow, STEP, ctx, ctx.follow_memory)
     return outcome

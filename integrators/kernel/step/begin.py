@@ -23,9 +23,10 @@ INFINITY = float("inf")
 @compiled
 def set_factors(ctx, h):
     """Set h and what is h times the velocities."""
+    factors = ctx.factors
     ctx.h = h
     if ctx.second:
-        velocity, factor, drift, kick = ctx.velocity, ctx.row_factor, ctx.drift_factor, ctx.kick_factor
+        velocity, factor, drift, kick = factors.velocity, factors.row, factors.drift, factors.kick
         for d in range(ctx.rows):
             kh = h * velocity[d]
             factor[d] = kh
@@ -36,13 +37,14 @@ def set_factors(ctx, h):
 @compiled
 def set_step(ctx, h):
     """Scale the matrix and the velocities by a step h that is taken once (`tables.scaled` is for many)."""
+    tables = ctx.tables
     set_factors(ctx, h)
-    if ctx.scaled_by == h:
+    if tables.scaled_by == h:
         return
-    ctx.scaled_by = h
+    tables.scaled_by = h
     twice = ctx.second and ctx.unit
-    raw, matrix = ctx.raw_matrix, ctx.matrix
-    for i in range(ctx.matrix_size):
+    raw, matrix = tables.raw_matrix, tables.matrix
+    for i in range(tables.matrix_size):
         value = h * get(raw, 8 * i)
         put(matrix, 8 * i, h * value if twice else value)
 
@@ -51,7 +53,7 @@ def set_step(ctx, h):
 def set_times(ctx):
     """Set the stages' times to t0 + n h + c h, with t0 and n h as sums of two doubles."""
     t, low = time_of_step(ctx.t0, ctx.time_low, float(ctx.n), ctx.h)
-    times, nodes = ctx.times, ctx.nodes
+    times, nodes = ctx.times, ctx.tables.nodes
     for chunk in range(ctx.chunks):
         put(times, 8 * chunk, t + fma(get(nodes, 8 * chunk), splat8(ctx.h), splat8(low)))
 
@@ -59,7 +61,8 @@ def set_times(ctx):
 @compiled
 def prepare(ctx):
     """Set the stages' times, and what they have without the field's values, from the state."""
-    state, error, row_state, row_error = ctx.state, ctx.error, ctx.row_state, ctx.row_error
+    scratch = ctx.scratch
+    state, error, row_state, row_error = ctx.state, ctx.error, scratch.row_state, scratch.row_error
     rows, lanes = ctx.rows, ctx.lanes
     set_times(ctx)
     if ctx.second == 0:
@@ -67,11 +70,11 @@ def prepare(ctx):
             put(row_state, 8 * i, get(state, 8 * i))
             put(row_error, 8 * i, get(error, 8 * i))
         for chunk in range(ctx.chunks):
-            base = ctx.base + offset(ctx, chunk)
+            base = scratch.base + offset(ctx, chunk)
             for d in range(rows):
                 put(base, lanes * d, spread(row_error, d))
         return
-    row_drift, row_drift_low, factor = ctx.row_drift, ctx.row_drift_low, ctx.drift_factor
+    row_drift, row_drift_low, factor = scratch.row_drift, scratch.row_drift_low, ctx.factors.drift
     for i in range((rows + 3) // 4):
         z, e, kh = get(state, 8 * i), get(error, 8 * i), get(factor, 8 * i)
         moved, moved_low = drift(kh, z, e)
@@ -79,10 +82,10 @@ def prepare(ctx):
         put_upper(row_error, 4 * i, e)
         put_lower(row_drift, 4 * i, moved)
         put_lower(row_drift_low, 4 * i, moved_low)
-    nodes, nodes_low = ctx.nodes, ctx.nodes_low
+    nodes, nodes_low = ctx.tables.nodes, ctx.tables.nodes_low
     for chunk in range(ctx.chunks):
         c, c_low = get(nodes, 8 * chunk), get(nodes_low, 8 * chunk)
-        base = ctx.base + offset(ctx, chunk)
+        base = scratch.base + offset(ctx, chunk)
         for d in range(rows):
             moved, moved_low = spread(row_drift, d), spread(row_drift_low, d)
             put(base, lanes * d, part_of_drift(c, c_low, moved, moved_low, spread(row_error, d)))
@@ -94,25 +97,26 @@ def prepare(ctx):
 @compiled
 def start_plain(ctx):
     """First stages without a force (second-order form), or constant."""
-    rows, lanes, state = ctx.rows, ctx.lanes, ctx.row_state
+    rows, lanes, state = ctx.rows, ctx.lanes, ctx.scratch.row_state
     for chunk in range(ctx.chunks):
         start = offset(ctx, chunk)
-        stages, base = ctx.stages + start, ctx.base + start
+        stages, base = ctx.stages + start, ctx.scratch.base + start
         for d in range(rows):
             put(stages, lanes * d, spread(state, d) + get(base, lanes * d))
-    ctx.predicted = 0
+    ctx.solver.predicted = 0
 
 
 @compiled
 def start_extrapolated(ctx):
     """First stages from the values of the previous step, or of two, of the same length."""
-    if ctx.two_steps != 0 and ctx.older_length == ctx.h:
-        product_of_two(ctx, ctx.extrapolation_two, ctx.older_values)
+    tables = ctx.tables
+    if tables.two_steps != 0 and ctx.older_length == ctx.h:
+        product_of_two(ctx, tables.extrapolation_two, ctx.older_values)
     elif ctx.route == THROUGH:
-        through(ctx, ctx.mode_projection, ctx.mode_groups, ctx.extrapolation)
+        through(ctx, tables.mode_projection, tables.mode_groups, tables.extrapolation)
     else:
-        product(ctx, ctx.extrapolation)
-    ctx.predicted = 1
+        product(ctx, tables.extrapolation)
+    ctx.solver.predicted = 1
 
 
 @for_both_widths
@@ -123,28 +127,29 @@ def behind(c, first, ratio):
 
 @for_both_widths
 def next_polynomial(a, b, x, here, before):
-    """Return P_{j+1} of P_j and P_{j-1} at x; see `Context.recurrence`."""
+    """Return P_{j+1} of P_j and P_{j-1} at x; see `Tables.recurrence`."""
     return fma(a * x, here, -b * before)
 
 
 @compiled
 def start_elsewhere(ctx, source, first, ratio):
     """First stages from the values of the context ``source``; there the nodes are ``first + ratio * c``."""
-    rows, chunks, groups = ctx.rows, ctx.chunks, ctx.mode_groups
-    nodes, basis, recurrence = ctx.nodes, ctx.basis, ctx.recurrence
+    tables = ctx.tables
+    rows, chunks, groups = ctx.rows, ctx.chunks, tables.mode_groups
+    nodes, basis, recurrence = tables.nodes, ctx.scratch.basis, tables.recurrence
     for chunk in range(chunks):
         x = behind(get(nodes, 8 * chunk), first, ratio)
         before = splat8(0.0)
         here = splat8(1.0)
-        for j in range(ctx.modes):
+        for j in range(tables.modes):
             put(basis, 8 * (chunk * 8 * groups + j), here)
             after = next_polynomial(recurrence[2 * j], recurrence[2 * j + 1], x, here, before)
             before = here
             here = after
-    project(source, ctx.mode_projection, groups)
-    multiply(basis, chunks, groups, source.coefficients, 8, ctx.values, ctx.lanes, rows, ctx.padded)
-    product(ctx, ctx.matrix)
-    ctx.predicted = 1
+    project(source, tables.mode_projection, groups)
+    multiply(basis, chunks, groups, source.scratch.coefficients, 8, ctx.values, ctx.lanes, rows, ctx.padded)
+    product(ctx, tables.matrix)
+    ctx.solver.predicted = 1
 
 
 @compiled
@@ -172,7 +177,7 @@ def on_table(ctx, ratio):
 @compiled
 def start_onward(ctx):
     """First stages from the values of the step before by a table, if there is one; return whether."""
-    if ctx.length == 0.0 or ctx.rejected or ctx.route <= THROUGH:
+    if ctx.length == 0.0 or ctx.controller.rejected or ctx.route <= THROUGH:
         return False
     ratio = ctx.h / ctx.length
     if not 0.5 <= ratio <= 2.0:
@@ -180,8 +185,8 @@ def start_onward(ctx):
     found = int(octaves(ratio) + 0.5)
     if ctx.length * ratio_at(found) != ctx.h:
         return False
-    product_for_one(ctx, ctx.extrapolation + 8 * ctx.matrix_size * found)
-    ctx.predicted = 1
+    product_for_one(ctx, ctx.tables.extrapolation + 8 * ctx.tables.matrix_size * found)
+    ctx.solver.predicted = 1
     return True
 
 
@@ -207,9 +212,10 @@ def predict(ctx, source, length, first):
 @compiled
 def rewind(ctx):
     """Begin to count the iterations of a start."""
-    ctx.outcome = RUNNING
-    ctx.tests = ctx.tried = ctx.stalled = 0
-    ctx.best = ctx.last = INFINITY
+    solver = ctx.solver
+    solver.outcome = RUNNING
+    solver.tests = solver.tried = solver.stalled = 0
+    solver.best = solver.last = INFINITY
 
 
 @compiled
@@ -229,7 +235,7 @@ def choose(ctx):
         ctx.values, ctx.older_values = ctx.older_values, ctx.values
     elif not (ctx.varying and start_onward(ctx)):
         ctx.older_length = 0.0
-        predict(ctx, ctx, ctx.length, 0.0 if ctx.rejected else 1.0)
-    ctx.age -= 1
-    if ctx.age < 0 or ctx.predicted == 0:
+        predict(ctx, ctx, ctx.length, 0.0 if ctx.controller.rejected else 1.0)
+    ctx.blocks.age -= 1
+    if ctx.blocks.age < 0 or ctx.solver.predicted == 0:
         take_sizes(ctx)

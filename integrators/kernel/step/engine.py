@@ -4,7 +4,7 @@ from typing import Any
 
 from integrators.kernel.native.engine import ENTRY, Engine
 
-SOURCES = ("simd", "native", "context", "tables", "step")
+SOURCES = ("simd", "native", "parts", "context", "tables", "step")
 
 
 def _entry() -> Any:

@@ -2,7 +2,8 @@
 
 from math import log
 
-from integrators.kernel.context import (
+from integrators.kernel.native.jit import compiled, for_both_widths
+from integrators.kernel.parts.estimate import (
     AFTER_MIDDLE,
     AT_END,
     AT_ERROR,
@@ -16,7 +17,6 @@ from integrators.kernel.context import (
     LAST,
     MIDDLE,
 )
-from integrators.kernel.native.jit import compiled, for_both_widths
 from integrators.kernel.simd.lanes import fma
 from integrators.kernel.simd.memory import get, put, splat8, sums, total
 from integrators.kernel.simd.operations import greatest, least, size, where
@@ -42,7 +42,7 @@ ALIKE = 1e-14  # part of the field's mean that its other coefficients are at mos
 def coefficient(ctx, row, which):
     """Return eight partial sums of what row ``which`` of the estimators makes of a row of values."""
     values, i, chunks = ctx.values, ctx.lanes * row, ctx.chunks
-    table = ctx.estimators + 8 * chunks * which
+    table = ctx.estimate.estimators + 8 * chunks * which
     if ctx.route == 8:
         return get(table, 0) * get(values, i)
     if ctx.route == 16:
@@ -69,7 +69,7 @@ def take_coefficients(ctx):
             coefficient(ctx, d, BEFORE_LAST),
             coefficient(ctx, d, LAST),
         )
-        put(ctx.estimates, 8 * d, abs(sums(*low, *high)))
+        put(ctx.estimate.coefficients, 8 * d, abs(sums(*low, *high)))
 
 
 @compiled
@@ -81,7 +81,7 @@ def of_two(table, which, low, high):
 @compiled
 def take_coefficients_of_two(ctx):
     """As `take_coefficients`, for two times eight stages: the same sums, with each value loaded once."""
-    found, table, values = ctx.estimates, ctx.estimators, ctx.values
+    found, table, values = ctx.estimate.coefficients, ctx.estimate.estimators, ctx.values
     for d in range(ctx.rows):
         x, y = get(values, 16 * d), get(values, 16 * d + 8)
         low = (
@@ -118,9 +118,10 @@ def compare_ends(ctx):
 
     As their polynomials say. It is done last, since the length of the next step has not to wait for it.
     """
-    found, borders, behind, gaps = ctx.estimates, ctx.borders, ctx.borders_behind, ctx.gaps
-    lasts, lasts_behind = ctx.lasts, ctx.lasts_behind
-    table, values, two = ctx.estimators, ctx.values, ctx.route == 16
+    kinks = ctx.kinks
+    found, borders, behind, gaps = ctx.estimate.coefficients, kinks.borders, kinks.borders_behind, kinks.gaps
+    lasts, lasts_behind = kinks.lasts, kinks.lasts_behind
+    table, values, two = ctx.estimate.estimators, ctx.values, ctx.route == 16
     apart = False
     for d in range(ctx.rows):
         if two:
@@ -132,7 +133,7 @@ def compare_ends(ctx):
         gaps[d] = far = abs(total(start - get(behind, 8 * d)))
         lasts[d] = last = greatest(found[8 * d + BEFORE_LAST], found[8 * d + LAST])
         apart |= is_gap(far, last, lasts_behind[d])
-    ctx.apart = 1 if apart else 0
+    kinks.apart = 1 if apart else 0
 
 
 @compiled
@@ -141,7 +142,7 @@ def stays(ctx, d, last):
     middle = greatest(
         size(total(coefficient(ctx, d, MIDDLE))), size(total(coefficient(ctx, d, AFTER_MIDDLE)))
     )
-    return last > ctx.slowest_decay * middle
+    return last > ctx.kinks.slowest_decay * middle
 
 
 @for_both_widths
@@ -202,13 +203,13 @@ def is_visible(h, gamma, scale):
 @compiled
 def note_what_stays(ctx):
     """Note for each block the largest last coefficient that is as large as at a kink; 0: none."""
-    abrupt = ctx.abrupt
+    abrupt = ctx.estimate.abrupt
     for d in range(ctx.rows):
-        found = ctx.estimates + 8 * d
+        found = ctx.estimate.coefficients + 8 * d
         low = lowest(found[GAMMA_1], found[GAMMA_2], found[GAMMA_3])
         high = greatest(found[BEFORE_LAST], found[LAST])
-        if is_doubtful(low, high, ctx.doubt) and stays(ctx, d, found[LAST]):
-            b = ctx.block[d]
+        if is_doubtful(low, high, ctx.kinks.doubt) and stays(ctx, d, found[LAST]):
+            b = ctx.blocks.of_row[d]
             abrupt[b] = greatest(abrupt[b], high)
 
 
@@ -222,20 +223,20 @@ def momentum(ctx, d):
 @compiled
 def own_size(ctx, b):
     """Return the size of a block in the step that is estimated, unless that is next to nothing."""
-    return size_in_step(ctx.scale[b], ctx.fastest[ctx.group[b]] * ctx.mass[b])
+    return size_in_step(ctx.estimate.scale[b], ctx.estimate.fastest[ctx.blocks.group[b]] * ctx.blocks.mass[b])
 
 
 @compiled
 def steepest_beside(ctx, b):
     """Return the steepest field in the group of a block, for its mass."""
-    return ctx.steepest[ctx.group[b]] * ctx.mass[b]
+    return ctx.estimate.steepest[ctx.blocks.group[b]] * ctx.blocks.mass[b]
 
 
 @compiled
 def block_size(ctx, b):
     """Return the size that a block's errors are relative to: its own, or one that is known from elsewhere."""
-    size = max(own_size(ctx, b), ctx.absolute[b])
-    return max(size, ctx.expected[b]) if ctx.rescaled else size
+    size = max(own_size(ctx, b), ctx.estimate.absolute[b])
+    return max(size, ctx.estimate.expected[b]) if ctx.estimate.rescaled else size
 
 
 @compiled
@@ -252,52 +253,61 @@ def estimate(ctx):
 
     All this is true of coefficients that fall off geometrically. At a jump or a kink of
     the field they do not: |gamma_j| falls off like 1/j or 1/j^2, and the error of the
-    quadrature is of the size of h |gamma_{k-1}| itself. `Context.kinked` says whether there is more
+    quadrature is of the size of h |gamma_{k-1}| itself. `Kinks.kinked` says whether there is more
     of that than rounding and tolerance account for. If there is less, nothing is gained
     by cutting the step further, whatever the squares are. Where the formulas tell that a switching surface
-    is crossed (`Context.crossed`), all that the last coefficients are counts as a kink's.
+    is crossed (`Surfaces.crossed`), all that the last coefficients are counts as a kink's.
 
     From rest the size is what the field makes of a block in this very step. If it begins like a power of t,
     the squares are the same at all lengths of the step; if it begins in the field's rounding or with a
-    jump, they are about 1. No step is good enough then by the block's own size, and `Context.expected`, that
-    which it will reach, takes its place until `Context.borrowed` is 0 again.
+    jump, they are about 1. No step is good enough then by the block's own size, and `Estimate.expected`, that
+    which it will reach, takes its place until `Estimate.borrowed` is 0 again.
     """
+    kinks = ctx.kinks
     h = abs(ctx.h)
     if ctx.route == 16:
         take_coefficients_of_two(ctx)
     else:
         take_coefficients(ctx)
     doubtful = measure_blocks(ctx)
-    if ctx.crossed:
+    if ctx.surfaces.crossed:
         doubtful = True
-        for b in range(ctx.block_count):
-            ctx.abrupt[b] = greatest(ctx.gamma_error[b], ctx.gamma_last[b])
+        for b in range(ctx.blocks.count):
+            ctx.estimate.abrupt[b] = greatest(ctx.estimate.gamma_error[b], ctx.estimate.gamma_last[b])
     elif doubtful:
         note_what_stays(ctx)
-    allowed, allowed_defect, negligible = ctx.allowed_error, ctx.allowed_defect, ctx.negligible
+    allowed, allowed_defect, negligible = (
+        ctx.controller.allowed_error,
+        ctx.controller.allowed_defect,
+        kinks.negligible,
+    )
     narrow = h <= NARROWEST * abs(ctx.t0)
     error, defect = 0.0, 0.0
     kinked = borrowed = 0
-    rescaled, slopes, absolute = ctx.rescaled, ctx.slope, ctx.absolute
-    for b in range(ctx.block_count):
+    rescaled, slopes, absolute = ctx.estimate.rescaled, ctx.estimate.slope, ctx.estimate.absolute
+    for b in range(ctx.blocks.count):
         steepest = steepest_beside(ctx, b)
-        slope = slope_beside(slopes[b], steepest, ctx.least_slope)
+        slope = slope_beside(slopes[b], steepest, ctx.estimate.least_slope)
         if slope > 0.0:
             own, scale = own_size(ctx, b), block_size(ctx, b)
-            gamma_error, gamma_last, high = ctx.gamma_error[b], ctx.gamma_last[b], ctx.abrupt[b]
+            gamma_error, gamma_last, high = (
+                ctx.estimate.gamma_error[b],
+                ctx.estimate.gamma_last[b],
+                ctx.estimate.abrupt[b],
+            )
             if slope > slopes[b] and high <= UNSEEN * steepest:
                 high = 0.0
             most, most_defect = INFINITY, INFINITY
             if doubtful and high > 0.0:
                 slight = BESIDE_NOTHING * negligible if narrow else negligible
-                if ctx.kinks > 0 and h * max(high, max(gamma_error, gamma_last)) <= slight * scale:
+                if kinks.count > 0 and h * max(high, max(gamma_error, gamma_last)) <= slight * scale:
                     most, most_defect = SLIGHT * allowed, SLIGHT * allowed_defect
                 elif h * high > negligible * scale and not narrow:
                     kinked = 1
             block_error = least(most, local_error(h, gamma_error, slope, scale))
             error = greatest(error, block_error)
             if absolute[b] > own:
-                scale = max(own, ctx.expected[b]) if rescaled else own
+                scale = max(own, ctx.estimate.expected[b]) if rescaled else own
             block_defect = least(most_defect, local_error(h, gamma_last, slope, scale))
             defect = greatest(defect, block_defect)
             if rescaled:
@@ -305,7 +315,7 @@ def estimate(ctx):
                 fits = block_error * times <= allowed and block_defect * times <= allowed_defect
                 if not fits or (doubtful and h * high > negligible * own):
                     borrowed = 1
-    ctx.kinked, ctx.borrowed = kinked, borrowed
+    kinks.kinked, ctx.estimate.borrowed = kinked, borrowed
     compare_ends(ctx)
     return error, defect
 
@@ -313,17 +323,23 @@ def estimate(ctx):
 @compiled
 def measure_blocks(ctx):
     """Set the blocks' scales and coefficients; return whether one does not fall off well enough."""
-    h, doubt = abs(ctx.h), ctx.doubt
-    error_decay, defect_decay = ctx.error_decay, ctx.defect_decay
-    scale, slopes, gamma_error, gamma_last = ctx.scale, ctx.slope, ctx.gamma_error, ctx.gamma_last
-    group, top, steepest = ctx.group, ctx.fastest, ctx.steepest
-    for b in range(ctx.block_count):
-        scale[b] = slopes[b] = gamma_error[b] = gamma_last[b] = ctx.abrupt[b] = 0.0
-    for g in range(ctx.group_count):
+    blocks = ctx.blocks
+    h, doubt = abs(ctx.h), ctx.kinks.doubt
+    error_decay, defect_decay = ctx.estimate.error_decay, ctx.estimate.defect_decay
+    scale, slopes, gamma_error, gamma_last = (
+        ctx.estimate.scale,
+        ctx.estimate.slope,
+        ctx.estimate.gamma_error,
+        ctx.estimate.gamma_last,
+    )
+    group, top, steepest = blocks.group, ctx.estimate.fastest, ctx.estimate.steepest
+    for b in range(blocks.count):
+        scale[b] = slopes[b] = gamma_error[b] = gamma_last[b] = ctx.estimate.abrupt[b] = 0.0
+    for g in range(blocks.groups):
         top[g] = steepest[g] = 0.0
     doubtful, changing = False, False
     for d in range(ctx.rows):
-        b, found = ctx.block[d], ctx.estimates + 8 * d
+        b, found = blocks.of_row[d], ctx.estimate.coefficients + 8 * d
         low = lowest(found[GAMMA_1], found[GAMMA_2], found[GAMMA_3])
         high = greatest(found[BEFORE_LAST], found[LAST])
         slope = greatest(found[GAMMA_0], low)
@@ -335,11 +351,11 @@ def measure_blocks(ctx):
         defect = next_coefficient(found[LAST], found[BEFORE_LAST], defect_decay)
         gamma_error[b] = greatest(gamma_error[b], error)
         gamma_last[b] = greatest(gamma_last[b], defect)
-    for b in range(ctx.block_count):
+    for b in range(blocks.count):
         g = group[b]
-        top[g] = greatest(top[g], scale[b] * ctx.speed[b])
-        steepest[g] = greatest(steepest[g], slopes[b] * ctx.speed[b])
-    ctx.blind = 0 if changing else 1
+        top[g] = greatest(top[g], scale[b] * blocks.speed[b])
+        steepest[g] = greatest(steepest[g], slopes[b] * blocks.speed[b])
+    ctx.estimate.blind = 0 if changing else 1
     return doubtful
 
 
@@ -352,24 +368,26 @@ def log_decay(ctx):
     whose low ones do not fall off either, and would not be an error even if they were what is left out, is a
     fast mode at rest that rounding moves: it says nothing about the step.
     """
-    steps = min(3, ctx.error_degree - 1)
+    steps = min(3, ctx.controller.error_degree - 1)
     if steps < 1:
         return 0.0
     h = abs(ctx.h)
     slowest = -INFINITY
     for d in range(ctx.rows):
-        b, found = ctx.block[d], ctx.estimates + 8 * d
+        b, found = ctx.blocks.of_row[d], ctx.estimate.coefficients + 8 * d
         last, size = found[GAMMA_3], block_size(ctx, b)
         if steps == 3:
-            last = next_coefficient(last, found[GAMMA_2], ctx.error_decay)
-        if last > RESTLESS * ctx.slope[b]:
-            slope = slope_beside(ctx.slope[b], steepest_beside(ctx, b), ctx.least_slope)
-            if local_error(h, last, slope, size) <= RESTING * ctx.allowed_error:
+            last = next_coefficient(last, found[GAMMA_2], ctx.estimate.error_decay)
+        if last > RESTLESS * ctx.estimate.slope[b]:
+            slope = slope_beside(ctx.estimate.slope[b], steepest_beside(ctx, b), ctx.estimate.least_slope)
+            if local_error(h, last, slope, size) <= RESTING * ctx.controller.allowed_error:
                 continue
-        if is_visible(h, next_coefficient(found[AT_ERROR], found[BEFORE_ERROR], ctx.error_decay), size):
+        if is_visible(
+            h, next_coefficient(found[AT_ERROR], found[BEFORE_ERROR], ctx.estimate.error_decay), size
+        ):
             return 0.0
         if is_visible(h, last, size):
-            slowest = max(slowest, log(last / ctx.slope[b]) / steps)
+            slowest = max(slowest, log(last / ctx.estimate.slope[b]) / steps)
     return max(slowest, log(TINY))
 
 
@@ -380,11 +398,11 @@ def estimate_implicit(ctx):
     Those stay: where h J is large, rounding spoils the field's.
     """
     kept = ctx.values
-    ctx.values = ctx.sums
+    ctx.values = ctx.scratch.sums
     evaluate(ctx)
     found = estimate(ctx)
     ctx.values = kept
-    ctx.evaluations += ctx.k
+    ctx.counters.evaluations += ctx.k
     return found
 
 
@@ -392,9 +410,11 @@ def estimate_implicit(ctx):
 def first_length(ctx):
     """Return a first step from the field at the state: short, the following grow.
 
-    Where the state is 0, or the field is 0 or infinite, there is no time scale: `Context.restful` is 1 then,
-    and the step the shorter one of what it would be with a unit for the state and a part of the interval.
+    Where the state is 0, or the field is 0 or infinite, there is no time scale: `Controller.restful` is 1
+    then, and the step the shorter one of what it would be with a unit for the state and a part of the
+    interval.
     """
+    controller = ctx.controller
     set_step(ctx, 0.0)
     prepare(ctx)
     start_plain(ctx)
@@ -403,9 +423,9 @@ def first_length(ctx):
     position, speed, pull = 0.0, 0.0, 0.0
     for d in range(rows):
         slope = abs(values[lanes * d])
-        position = max(position, abs(ctx.row_state[d]))
+        position = max(position, abs(ctx.scratch.row_state[d]))
         if ctx.second:
-            velocity = ctx.velocity[d]
+            velocity = ctx.factors.velocity[d]
             speed = max(speed, abs(velocity * momentum(ctx, d)))
             pull = max(pull, abs(velocity) * slope)
         else:
@@ -413,14 +433,15 @@ def first_length(ctx):
     rate = speed
     if position > 0.0:
         rate = max(speed / position, (pull / position) ** 0.5)
-    length = ctx.allowed_error ** (1.0 / (2.0 * ctx.error_degree + 1.0))
-    ctx.restful = 0 if position > 0.0 and 0.0 < rate < INFINITY else 1
+    length = controller.allowed_error ** (1.0 / (2.0 * controller.error_degree + 1.0))
+    controller.restful = 0 if position > 0.0 and 0.0 < rate < INFINITY else 1
     return max(length / rate, RESTART * abs(ctx.t0)) if 0.0 < rate < INFINITY else length
 
 
 @compiled
 def shorten_first(ctx):
     """Let the first step be a part of the interval at most where nothing else tells how long it may be."""
-    most = FIRST_AT_REST * ctx.interval
-    if ctx.restful and 0.0 < most < abs(ctx.next_length):
-        ctx.next_length = most if ctx.next_length > 0.0 else -most
+    controller = ctx.controller
+    most = FIRST_AT_REST * controller.interval
+    if controller.restful and 0.0 < most < abs(controller.next_length):
+        controller.next_length = most if controller.next_length > 0.0 else -most

@@ -36,7 +36,13 @@ def weighted(ctx, row, high, low):
 @compiled
 def impulses(ctx, d):
     """For the rows d .. d+3, means of the force with the weights b, then the position's, and their rests."""
-    b, b_low, w, w_low = ctx.weights, ctx.weights_low, ctx.position_weights, ctx.position_weights_low
+    tables = ctx.tables
+    b, b_low, w, w_low = (
+        tables.weights,
+        tables.weights_low,
+        tables.position_weights,
+        tables.position_weights_low,
+    )
     return sums_and_rests(
         weighted(ctx, d, b, b_low), weighted(ctx, d + 1, b, b_low),
         weighted(ctx, d + 2, b, b_low), weighted(ctx, d + 3, b, b_low),
@@ -48,7 +54,7 @@ def impulses(ctx, d):
 @compiled
 def means(ctx, d):
     """For the rows d .. d+7, the means of the field with the weights b, and their rests."""
-    b, low = ctx.weights, ctx.weights_low
+    b, low = ctx.tables.weights, ctx.tables.weights_low
     return sums_and_rests(
         weighted(ctx, d, b, low), weighted(ctx, d + 1, b, low),
         weighted(ctx, d + 2, b, low), weighted(ctx, d + 3, b, low),
@@ -103,7 +109,7 @@ def add(ctx, i, increment):
 @compiled
 def finish_by_increment(ctx):
     """As `finish`, from increments: those of q are not found from the forces without cancellation."""
-    rows, increment = ctx.rows, ctx.increment
+    rows, increment = ctx.rows, ctx.implicit.increment
     damage = 0.0
     for d in range(rows):
         if ctx.second:
@@ -126,7 +132,7 @@ def finish_unprojected(ctx):
     state, error, next_state, next_error = ctx.state, ctx.error, ctx.next_state, ctx.next_error
     damage = splat8(0.0)
     if ctx.second:
-        factor, kick = ctx.drift_factor, ctx.kick_factor
+        factor, kick = ctx.factors.drift, ctx.factors.kick
         for i in range((rows + 3) // 4):
             z, e, kh = get(state, 8 * i), get(error, 8 * i), get(factor, 8 * i)
             moved, moved_low = drift(kh, z, e)
@@ -149,7 +155,7 @@ def finish_unprojected(ctx):
 def finish(ctx):
     """Set the next state of the solved step, projected where that is asked for; return the outcome."""
     outcome = finish_unprojected(ctx)
-    if outcome == DONE and ctx.energy_code:
+    if outcome == DONE and ctx.energy.code:
         project_onto_energy(ctx)
     return outcome
 
@@ -166,7 +172,7 @@ def commit(ctx):
 @compiled
 def count_step(ctx):
     """Keep the books of a step whose end is the state now."""
-    ctx.steps += 1
+    ctx.counters.steps += 1
     ctx.length = ctx.h
     ctx.solved = UNSOLVED
     arrive(ctx)

@@ -14,7 +14,6 @@ from llvmlite import ir
 
 from integrators.kernel.context import EVALUATE, Context
 from integrators.kernel.native import binary, field, machine, store
-from integrators.kernel.native.memory import Slot
 from integrators.kernel.simd.emit import (
     ALIGNMENT,
     DOUBLE,
@@ -42,8 +41,8 @@ ROWS = 4
 def compile_sweeps(system: System, what: emit.Quantity, lanes: int, rows: int) -> binary.Native:
     """Compile ``void(context, count, after)``, or load it: for a field on lanes, and factors in the matrix.
 
-    It does ``count`` sweeps. With ``after`` = `MEASURE`, for one sweep or more, `Context.old_stages` then
-    holds the stages before the last one, and `Context.change` the largest change relative to the size of
+    It does ``count`` sweeps. With ``after`` = `MEASURE`, for one sweep or more, `Scratch.old_stages` then
+    holds the stages before the last one, and `Solver.change` the largest change relative to the size of
     its block; with `EVALUATE`, the field's values are then those at the newest stages.
 
     Parameters
@@ -54,7 +53,7 @@ def compile_sweeps(system: System, what: emit.Quantity, lanes: int, rows: int) -
         Components of a stage.
     """
     source = emit.source(system, what, "numba")
-    modules = binary.sources(*field.SOURCES, "context", "step/fused")
+    modules = binary.sources(*field.SOURCES, "parts", "context", "step/fused")
     by_columns = lanes == WIDTH or machine.many_registers()
     name = store.key("sweeps", source.text, str(lanes), str(rows), str(by_columns), modules)
 
@@ -88,10 +87,10 @@ def sweeps(inner: str, lanes: int, rows: int, by_columns: bool) -> str:
     def number(value: int) -> Any:
         return ir.Constant(INTEGER, value)
 
-    def word(slot: Slot) -> Any:
-        return b.gep(words, [number(slot.place)])
+    def word(slot: str) -> Any:
+        return b.gep(words, [number(Context.word_of[slot])])
 
-    def array(slot: Slot) -> Any:
+    def array(slot: str) -> Any:
         return b.inttoptr(b.load(word(slot)), pointer)
 
     def place(base: Any, index: int, kind: Any) -> Any:
@@ -116,10 +115,10 @@ def sweeps(inner: str, lanes: int, rows: int, by_columns: bool) -> str:
     stages, values = b.alloca(room), b.alloca(room)
     stages.align = values.align = ALIGNMENT
     result, exception = b.alloca(pointer), b.alloca(pointer)
-    q, other, f = array(Context.stages), array(Context.old_stages), array(Context.values)
-    par = array(Context.par)
-    times = get(array(Context.times), 0, whole)
-    state, base, scale = array(Context.row_state), array(Context.base), array(Context.strict)
+    q, other, f = array("stages"), array("scratch.old_stages"), array("values")
+    par = array("par")
+    times = get(array("times"), 0, whole)
+    state, base, scale = array("scratch.row_state"), array("scratch.base"), array("blocks.weights")
     parts = range(lanes // WIDTH)
     starts = [[get(base, lanes * d + WIDTH * part, eight) for part in parts] for d in range(rows)]
     states = [splat(b, get(state, d, DOUBLE), WIDTH) for d in range(rows)]
@@ -143,7 +142,7 @@ def sweeps(inner: str, lanes: int, rows: int, by_columns: bool) -> str:
     b.cbranch(b.icmp_signed(">", left, zero), product, evaluated)
 
     b.position_at_end(product)
-    matrix = b.inttoptr(b.load_atomic(word(Context.matrix), "monotonic", 8), pointer)
+    matrix = b.inttoptr(b.load_atomic(word("tables.matrix"), "monotonic", 8), pointer)
 
     def all_at_once() -> list[Any]:
         """Return the stages, column by column, for few of these to be in registers at a time."""
@@ -209,6 +208,6 @@ def sweeps(inner: str, lanes: int, rows: int, by_columns: bool) -> str:
                     b.shuffle_vector(new[d], new[d], chosen), b.shuffle_vector(old[d], old[d], chosen)
                 )
                 top = larger_of(b, top, b.fmul(llvm_call(b, "fabs", moved), size))
-        b.store(largest_of(b, top), b.bitcast(word(Context.change), pointer))
+        b.store(largest_of(b, top), b.bitcast(word("solver.change"), pointer))
     b.ret_void()
     return text_of(module)

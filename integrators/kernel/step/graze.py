@@ -4,8 +4,8 @@ No node sees such a contact, but the distance from the surface does not fall to 
 minimum at the nodes beside it. There the polynomial of the step is looked at more closely.
 """
 
-from integrators.kernel.context import MOST_SIDES
 from integrators.kernel.native.jit import compiled
+from integrators.kernel.parts.surfaces import MOST_SIDES
 from integrators.kernel.simd.memory import call_field
 from integrators.kernel.step.estimate import block_size
 from integrators.kernel.step.sample import interpolate
@@ -20,8 +20,8 @@ BESIDE = 10.0
 def grazes(ctx):
     """Whether the solved step, whose ends and nodes are on one side, touches a surface and it matters."""
     last = ctx.k + 1
-    for i in range(1, 1 + ctx.surfaces):
-        before, here, x_before, x_here = distance(ctx, i, 0), distance(ctx, i, 1), 0.0, ctx.nodes[0]
+    for i in range(1, 1 + ctx.surfaces.count):
+        before, here, x_before, x_here = distance(ctx, i, 0), distance(ctx, i, 1), 0.0, ctx.tables.nodes[0]
         for j in range(2, last + 1):
             after, x_after = distance(ctx, i, j), place(ctx, j)
             near = may_vanish(before, here, after, x_here - x_before, x_after - x_here)
@@ -34,7 +34,7 @@ def grazes(ctx):
 @compiled
 def place(ctx, j):
     """Return the part of the step at which point j is: the start, the nodes, the end."""
-    return 0.0 if j == 0 else ctx.nodes[j - 1] if j <= ctx.k else 1.0
+    return 0.0 if j == 0 else ctx.tables.nodes[j - 1] if j <= ctx.k else 1.0
 
 
 @compiled
@@ -42,9 +42,9 @@ def distance(ctx, i, j):
     """Return the distance from surface i at point j of `place`."""
     lanes = ctx.lanes
     if j == 0 or j > ctx.k:
-        return abs(ctx.side_ends[lanes * i + (1 if j else 0)])
+        return abs(ctx.surfaces.ends[lanes * i + (1 if j else 0)])
     call, lane = (j - 1) // lanes, (j - 1) % lanes
-    return abs(ctx.side_values[lanes * (MOST_SIDES * call + i) + lane])
+    return abs(ctx.surfaces.values[lanes * (MOST_SIDES * call + i) + lane])
 
 
 @compiled
@@ -59,14 +59,15 @@ def may_vanish(before, here, after, back, ahead):
 @compiled
 def touches(ctx, i, low, high):
     """Whether surface i is touched between two parts of the step by more than is negligible."""
-    lanes, values = ctx.lanes, ctx.side_between
+    surfaces = ctx.surfaces
+    lanes, values = ctx.lanes, surfaces.between
     for _ in range(LOOKS):
         width = (high - low) / (lanes - 1)
         set_states(ctx, low, width)
-        call_field(ctx.sides, ctx.side_times, ctx.sums, ctx.par, values)
+        call_field(surfaces.code, surfaces.times, ctx.scratch.sums, ctx.par, values)
         nearest = 0
         for lane in range(lanes):
-            if values[lane] != ctx.side_values[0]:
+            if values[lane] != surfaces.values[0]:
                 return matters(ctx, low, width)
             if abs(values[lanes * i + lane]) < abs(values[lanes * i + nearest]):
                 nearest = lane
@@ -82,31 +83,32 @@ def touches(ctx, i, low, high):
 @compiled
 def set_states(ctx, low, width):
     """Set states of the polynomial, a lane each, at equidistant parts of the step."""
-    lanes, rows, state = ctx.lanes, ctx.rows, ctx.side_state
+    lanes, rows, state = ctx.lanes, ctx.rows, ctx.surfaces.state
     for lane in range(lanes):
         c = low + width * lane
         interpolate(ctx, c, state)
-        ctx.side_times[lane] = ctx.t0 + c * ctx.h
+        ctx.surfaces.times[lane] = ctx.t0 + c * ctx.h
         for d in range(rows):
-            ctx.sums[lanes * d + lane] = state[d]
+            ctx.scratch.sums[lanes * d + lane] = state[d]
 
 
 @compiled
 def matters(ctx, low, width):
     """Whether beyond the surface the field is farther from its polynomial than is negligible."""
-    lanes, sides, found = ctx.lanes, ctx.side_between, ctx.estimates
+    surfaces = ctx.surfaces
+    lanes, sides, found = ctx.lanes, surfaces.between, ctx.estimate.coefficients
     values = ctx.stages  # the solved step does not need them any more
-    call_field(ctx.field, ctx.side_times, ctx.sums, ctx.par, values)
-    ctx.evaluations += lanes
+    call_field(ctx.field, surfaces.times, ctx.scratch.sums, ctx.par, values)
+    ctx.counters.evaluations += lanes
     # Unseen for no longer than the states that are looked at.
-    least = ctx.negligible / (abs(ctx.h) * width * (lanes - 1))
+    least = ctx.kinks.negligible / (abs(ctx.h) * width * (lanes - 1))
     for d in range(ctx.rows):
         i = 8 * d
         smooth = BESIDE * max(max(found[i + 4], found[i + 5]), max(found[i + 6], found[i + 7]))
-        most = max(smooth, least * block_size(ctx, ctx.block[d]))
+        most = max(smooth, least * block_size(ctx, ctx.blocks.of_row[d]))
         for lane in range(lanes):
             far = abs(values[lanes * d + lane] - polynomial(ctx, d, low + width * lane))
-            if sides[lane] != ctx.side_values[0] and far > most:
+            if sides[lane] != surfaces.values[0] and far > most:
                 return True
     return False
 
@@ -114,10 +116,10 @@ def matters(ctx, low, width):
 @compiled
 def polynomial(ctx, d, c):
     """Return the polynomial of row d of the field at a part of the step, after `interpolate`."""
-    x, gamma, total = 2.0 * c - 1.0, ctx.coefficients, 0.0
+    x, gamma, total = 2.0 * c - 1.0, ctx.scratch.coefficients, 0.0
     before, here = 0.0, 1.0
     for j in range(ctx.s):
-        i = ctx.first + j
+        i = ctx.tables.first + j
         total += (2.0 * j + 1.0) ** 0.5 * here * gamma[((i // 8) * ctx.padded + d) * 8 + i % 8]
         before, here = here, ((2.0 * j + 1.0) * x * here - j * before) / (j + 1.0)
     return total

@@ -1,7 +1,8 @@
 """When the implicit solver takes over from the fixed-point iteration, and how it is called."""
 
-from integrators.kernel.context import BUDGET, DONE, FIXED_POINT, FOR_STEPS
+from integrators.kernel.context import BUDGET, DONE
 from integrators.kernel.native.jit import compiled
+from integrators.kernel.parts.implicit import FIXED_POINT, FOR_STEPS
 from integrators.kernel.simd.memory import call_solver
 from integrators.kernel.step.iterate import settle
 
@@ -13,44 +14,45 @@ SHORTEST, LONGEST = 16, 256  # steps for which it then stays, twice as many each
 @compiled
 def solve_implicitly(ctx, side, started):
     """Solve the step in ``side``, ``ctx`` itself or a partial step of it, by the implicit solver."""
-    ctx.implicit_steps += 1 - started
+    ctx.counters.implicit_steps += 1 - started
     ctx.older_length = 0.0
-    return call_solver(side.solver, side, side.solver_memory, started)
+    return call_solver(side.implicit.code, side, side.implicit.memory, started)
 
 
 @compiled
 def want_solver(ctx):
     """Come back for the implicit solver, which has to be loaded first; the step is continued then."""
-    ctx.wanted = FOR_STEPS
+    ctx.implicit.wanted = FOR_STEPS
     return BUDGET
 
 
 @compiled
 def reconsider(ctx, outcome):
     """Let the implicit solver take over from a fixed-point iteration that failed or was slow."""
-    if ctx.strategy == FIXED_POINT:
+    implicit = ctx.implicit
+    if implicit.strategy == FIXED_POINT:
         return outcome
-    ctx.slow = ctx.slow + 1 if outcome != DONE or ctx.tried >= MANY else 0
-    if outcome == DONE and ctx.slow < SLOW_STEPS:
+    implicit.slow = implicit.slow + 1 if outcome != DONE or ctx.solver.tried >= MANY else 0
+    if outcome == DONE and implicit.slow < SLOW_STEPS:
         return outcome
-    if ctx.solver == 0:
+    if implicit.code == 0:
         return want_solver(ctx)
-    ctx.held = ctx.left = min(max(2 * ctx.held, SHORTEST), LONGEST)
-    ctx.slow = 0
-    ctx.implicit = 1
-    ctx.switches += 1
+    implicit.held = implicit.left = min(max(2 * implicit.held, SHORTEST), LONGEST)
+    implicit.slow = 0
+    implicit.active = 1
+    ctx.counters.switches += 1
     return outcome if outcome == DONE else solve_implicitly(ctx, ctx, 0)
 
 
 @compiled
 def settle_part(ctx, side):
     """Solve a partial step of ``ctx``, prepared in ``side``; return the outcome."""
-    if ctx.implicit:
+    if ctx.implicit.active:
         return solve_implicitly(ctx, side, 1)
     outcome = settle(side)
-    if outcome == DONE or ctx.strategy == FIXED_POINT:
+    if outcome == DONE or ctx.implicit.strategy == FIXED_POINT:
         return outcome
-    if side.solver == 0:
+    if side.implicit.code == 0:
         return want_solver(ctx)
-    side.predicted = 0
+    side.solver.predicted = 0
     return solve_implicitly(ctx, side, 1)

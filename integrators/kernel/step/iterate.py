@@ -13,28 +13,36 @@ MAX_ITERATIONS = 200
 
 @compiled
 def test(ctx, strict):
-    """Apply the stopping rule to the change of the last sweep; `Context.outcome` says what came of it."""
-    last, ctx.last = ctx.last, strict
-    ctx.tests += 1
-    if ctx.age == 0:
+    """Apply the stopping rule to the change of the last sweep; `Solver.outcome` says what came of it."""
+    solver, blocks = ctx.solver, ctx.blocks
+    last, solver.last = solver.last, strict
+    solver.tests += 1
+    if blocks.age == 0:
         take_sizes(ctx)
-    best, stalled, ctx.rate, converged, rest = judge(
-        strict, last, ctx.best, ctx.stalled, ctx.rate, ctx.tried, ctx.tolerance, ctx.tolerance
+    best, stalled, solver.rate, converged, rest = judge(
+        strict,
+        last,
+        solver.best,
+        solver.stalled,
+        solver.rate,
+        solver.tried,
+        solver.tolerance,
+        solver.tolerance,
     )
     if not strict < INFINITY:
         # Growing changes overflow in the end; a NaN out of the blue is the field's own.
         restart(ctx, DIVERGED if 1.0 < last < INFINITY else NOT_FINITE)
         return
-    ctx.best, ctx.stalled = best, int(stalled)
-    if stalled > 0.0 and ctx.age < SIZES_LAST and ctx.varying == 0:
+    solver.best, solver.stalled = best, int(stalled)
+    if stalled > 0.0 and blocks.age < SIZES_LAST and ctx.varying == 0:
         take_sizes(ctx)  # of now: what has grown since is moved by more rounding
-    if converged or (stalled > 0.0 and stagnates(change(ctx, ctx.floored), stalled)):
+    if converged or (stalled > 0.0 and stagnates(change(ctx, blocks.floored_weights), stalled)):
         left = left_over(converged, rest, best)
         if left > 0.0:
             polish(ctx, left)
         else:
-            ctx.outcome = DONE
-    elif ctx.tried >= MAX_ITERATIONS:
+            solver.outcome = DONE
+    elif solver.tried >= MAX_ITERATIONS:
         restart(ctx, DIVERGED)
 
 
@@ -45,14 +53,15 @@ def polish(ctx, change):
     The last evaluation is at the newest stages: the field's values have the error of the
     stages that they were taken at.
     """
-    sweep_to_the_end(ctx, int(further(change, ctx.rate, ctx.log_rest)))
-    ctx.outcome = DONE
+    solver = ctx.solver
+    sweep_to_the_end(ctx, int(further(change, solver.rate, solver.log_rest)))
+    solver.outcome = DONE
 
 
 @compiled
 def settle(ctx):
     """Iterate with tests until the step is solved or has failed; return the outcome."""
-    while ctx.outcome == RUNNING:
+    while ctx.solver.outcome == RUNNING:
         test(ctx, sweep_measured(ctx, 0))
     return close(ctx)
 
@@ -60,18 +69,18 @@ def settle(ctx):
 @compiled
 def count(ctx):
     """Add the evaluations of a start to the counters."""
-    ctx.iterations += ctx.tried
-    ctx.evaluations += ctx.tried * ctx.k
+    ctx.counters.iterations += ctx.solver.tried
+    ctx.counters.evaluations += ctx.solver.tried * ctx.k
 
 
 @compiled
 def restart(ctx, outcome):
     """Try again without extrapolation, if there was any; else the step has failed."""
-    if ctx.predicted == 0:
-        ctx.outcome = outcome
+    if ctx.solver.predicted == 0:
+        ctx.solver.outcome = outcome
     else:
         count(ctx)
-        ctx.restarts += 1
+        ctx.counters.restarts += 1
         rewind(ctx)
         start_plain(ctx)
         take_sizes(ctx)
@@ -80,15 +89,16 @@ def restart(ctx, outcome):
 @compiled
 def close(ctx):
     """Keep the books of an iteration that has come to its end; return the outcome."""
+    solver = ctx.solver
     count(ctx)
-    if ctx.outcome == DONE:
+    if solver.outcome == DONE:
         ctx.solved = BY_VALUES
-        if ctx.predicted:
+        if solver.predicted:
             # Two tests tell how the changes fall; more mean that the first came early. It came late where
             # nothing was left to fall: then further changes are rounding, however many were looked at.
-            falling = ctx.tests - ctx.stalled
-            late = ctx.stalled == 0 and ctx.tests <= 2 and ctx.last <= ROUNDING
-            ctx.free = max(ctx.free + falling - (3 if late else 2), 0)
+            falling = solver.tests - solver.stalled
+            late = solver.stalled == 0 and solver.tests <= 2 and solver.last <= ROUNDING
+            solver.free = max(solver.free + falling - (3 if late else 2), 0)
     else:
         ctx.length = 0.0
-    return ctx.outcome
+    return solver.outcome

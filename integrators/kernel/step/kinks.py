@@ -1,16 +1,10 @@
 """Jumps and kinks of the field: steps over them are cut until they do not matter."""
 
-from integrators.kernel.context import (
-    AT_ORIGIN,
-    AT_START,
-    EXTRAPOLATED,
-    KINKS_KEPT,
-    NOTHING,
-    SEEN,
-    START,
-    UNSOLVED,
-)
+from integrators.kernel.context import UNSOLVED
 from integrators.kernel.native.jit import compiled, for_both_widths
+from integrators.kernel.parts.estimate import AT_START
+from integrators.kernel.parts.kinks import EXTRAPOLATED, KINKS_KEPT, NOTHING, SEEN, START
+from integrators.kernel.parts.surfaces import AT_ORIGIN
 from integrators.kernel.simd.memory import call_field, get, put, total
 from integrators.kernel.step.begin import INFINITY
 from integrators.kernel.step.control import CLOSE, RETREAT, SHORTEST, SHRINK
@@ -33,21 +27,22 @@ def kink(ctx, ends):
     Nodes do not see what is between the first or the last of them and the end of the step. What
     polynomials of two steps say of the field where they meet is compared, if ``ends``. If
     they do not agree, or there has been a kink, or a step may just have been rejected for one, the field
-    is evaluated at both ends. `Context.undone` says whether the jump is in the step behind.
+    is evaluated at both ends. `Kinks.undone` says whether the jump is in the step behind.
     """
-    ctx.border_ahead = NOTHING
-    if ctx.kinked == 0:
-        if ctx.line or not (ends and (ctx.doubt < INFINITY or ctx.crossed)):
+    kinks, surfaces = ctx.kinks, ctx.surfaces
+    kinks.border_ahead = NOTHING
+    if kinks.kinked == 0:
+        if ctx.line or not (ends and (kinks.doubt < INFINITY or surfaces.crossed)):
             return False
-        ctx.border_ahead = EXTRAPOLATED
-        suspect = ctx.crossed or ctx.kinks > 0 or (ctx.t0 - ctx.doubt_end) * ctx.h < 0.0
-        suspect = suspect or ctx.border == START or ends_at_break(ctx)
-        if not (suspect or ctx.apart):
-            if ctx.border == EXTRAPOLATED:
-                ctx.border = SEEN
+        kinks.border_ahead = EXTRAPOLATED
+        suspect = surfaces.crossed or kinks.count > 0 or (ctx.t0 - kinks.doubt_end) * ctx.h < 0.0
+        suspect = suspect or kinks.border == START or ends_at_break(ctx)
+        if not (suspect or kinks.apart):
+            if kinks.border == EXTRAPOLATED:
+                kinks.border = SEEN
             return False
         return jumps_at_an_end(ctx, suspect)
-    if ctx.crossed == 0:
+    if surfaces.crossed == 0:
         count(ctx, ctx.t0, ctx.h)
     return True
 
@@ -55,20 +50,22 @@ def kink(ctx, ends):
 @compiled
 def ends_at_break(ctx):
     """Whether the field may jump at the end of the solved step."""
-    close = CLOSE * max(abs(ctx.stop), abs(ctx.h))
-    return ctx.breaks == 1 and abs((ctx.stop - ctx.t0) - ctx.h) <= close
+    controller = ctx.controller
+    close = CLOSE * max(abs(controller.stop), abs(ctx.h))
+    return controller.breaks == 1 and abs((controller.stop - ctx.t0) - ctx.h) <= close
 
 
 @compiled
 def jumps_at_an_end(ctx, suspect):
     """Whether the field jumps where steps meet: by their polynomials or, if suspected, by its values."""
+    kinks = ctx.kinks
     if not (suspect or jumps(ctx)):
-        if ctx.border == EXTRAPOLATED:
-            ctx.border = SEEN
+        if kinks.border == EXTRAPOLATED:
+            kinks.border = SEEN
         return False
     if not differs_at_an_end(ctx):
-        return ctx.undone == 1
-    if ctx.crossed == 0:
+        return kinks.undone == 1
+    if ctx.surfaces.crossed == 0:
         count(ctx, ctx.t0, ctx.h)
     return True
 
@@ -76,13 +73,14 @@ def jumps_at_an_end(ctx, suspect):
 @compiled
 def count(ctx, t, h):
     """Count the place of a kink in the step from t of length h."""
-    found, end = ctx.kinks, ctx.kink_end
+    kinks = ctx.kinks
+    found, end = kinks.count, kinks.end
     if found == 0 or (t - end) * h >= 0.0:
         found += 1
-        ctx.kinks = found
-        ctx.kink_end = t + h
+        kinks.count = found
+        kinks.end = t + h
     if found <= KINKS_KEPT:
-        place = ctx.kink_places + 2 * (found - 1)
+        place = kinks.places + 2 * (found - 1)
         place[0] = t
         place[1] = h
 
@@ -100,13 +98,14 @@ def gap_allowed(negligible, outermost, h, length_behind):
 @compiled
 def jumps(ctx):
     """Whether the step behind and the solved step do not agree about the field where they meet."""
-    if ctx.border <= NOTHING:
+    kinks = ctx.kinks
+    if kinks.border <= NOTHING:
         return False
-    most = gap_allowed(ctx.negligible, ctx.nodes[0], abs(ctx.h), abs(ctx.length_behind))
+    most = gap_allowed(kinks.negligible, ctx.tables.nodes[0], abs(ctx.h), abs(ctx.controller.length_behind))
     for d in range(ctx.rows):
-        far = ctx.gaps[d]
-        apart = is_gap(far, ctx.lasts[d], ctx.lasts_behind[d])
-        if apart and far > most * block_size(ctx, ctx.block[d]):
+        far = kinks.gaps[d]
+        apart = is_gap(far, kinks.lasts[d], kinks.lasts_behind[d])
+        if apart and far > most * block_size(ctx, ctx.blocks.of_row[d]):
             return True
     return False
 
@@ -114,7 +113,7 @@ def jumps(ctx):
 @compiled
 def end_behind(ctx, d):
     """Return what the polynomial of the step behind says of row d of the field at its end."""
-    return total(get(ctx.borders_behind, 8 * d))
+    return total(get(ctx.kinks.borders_behind, 8 * d))
 
 
 @compiled
@@ -123,16 +122,17 @@ def differs_at_an_end(ctx):
 
     Where it may jump, at a breakpoint, it is looked at just inside the step.
     """
+    kinks, surfaces = ctx.kinks, ctx.surfaces
     h, t = abs(ctx.h), ctx.t0
-    ctx.undone = 0
+    kinks.undone = 0
     if h <= NARROWEST * abs(t):
         return False
     rows, lanes, second = ctx.rows, ctx.lanes, ctx.second
     # Stages at both ends, in memory that the solved step does not need any more; idle lanes repeat the last.
-    stages, times, values = ctx.old_stages, ctx.times, ctx.sums
+    stages, times, values = ctx.scratch.old_stages, ctx.times, ctx.scratch.sums
     inside = max(JUST * h, 2.0 * SHORTEST * abs(t))
     inside = inside if ctx.h > 0.0 else -inside
-    times[0] = t + inside if ctx.border == START else t
+    times[0] = t + inside if kinks.border == START else t
     for lane in range(1, lanes):
         times[lane] = t + ctx.h - inside if ends_at_break(ctx) else t + ctx.h
     for d in range(rows):
@@ -141,27 +141,27 @@ def differs_at_an_end(ctx):
         for lane in range(1, lanes):
             stages[lanes * d + lane] = ctx.next_state[place]
     call_field(ctx.field, times, stages, ctx.par, values)
-    ctx.evaluations += 2
+    ctx.counters.evaluations += 2
     # Unseen for no longer than the part of the step before the first node.
-    least = ctx.negligible / (h * ctx.nodes[0])
+    least = kinks.negligible / (h * ctx.tables.nodes[0])
     undone = 0
     for d in range(rows):
         before = abs(values[lanes * d] - total(coefficient(ctx, d, AT_START)))
-        after = abs(values[lanes * d + 1] - total(get(ctx.borders, 8 * d)))
+        after = abs(values[lanes * d + 1] - total(get(kinks.borders, 8 * d)))
         # On a switching surface rounding tells on which side the state is.
-        if ctx.on_surface:
+        if surfaces.on_surface:
             before = 0.0
-        if ctx.locating:
+        if surfaces.locating:
             after = 0.0
         far = max(finite(before), finite(after))
         # A crossing beyond the last node is no smooth field's distance from its polynomial.
-        smooth = 0.0 if ctx.crossed else OUTSIDE * ctx.lasts[d]
-        if far > smooth and far > least * block_size(ctx, ctx.block[d]):
+        smooth = 0.0 if surfaces.crossed else OUTSIDE * kinks.lasts[d]
+        if far > smooth and far > least * block_size(ctx, ctx.blocks.of_row[d]):
             return True
-        if ctx.border == EXTRAPOLATED and misses(ctx, d, values[lanes * d]):
+        if kinks.border == EXTRAPOLATED and misses(ctx, d, values[lanes * d]):
             undone = 1
-    ctx.undone = undone
-    ctx.border_ahead = SEEN
+    kinks.undone = undone
+    kinks.border_ahead = SEEN
     return False
 
 
@@ -179,46 +179,48 @@ def finite(far):
 def misses(ctx, d, value):
     """Whether the polynomial of the step behind is far from the field's value at its end, in row d."""
     far = finite(abs(value - end_behind(ctx, d)))
-    least = ctx.negligible / (abs(ctx.length_behind) * ctx.nodes[0])
-    return far > OUTSIDE * ctx.lasts_behind[d] and far > least * block_size(ctx, ctx.block[d])
+    least = ctx.kinks.negligible / (abs(ctx.controller.length_behind) * ctx.tables.nodes[0])
+    return far > OUTSIDE * ctx.kinks.lasts_behind[d] and far > least * block_size(ctx, ctx.blocks.of_row[d])
 
 
 @compiled
 def keep_end_of_part(ctx, side):
     """Let the step ahead be compared with the partial step in ``side``, at whose end it begins."""
-    ctx.border = NOTHING
-    if ctx.line or ctx.implicit or not ctx.doubt < INFINITY:
+    ctx.kinks.border = NOTHING
+    if ctx.line or ctx.implicit.active or not ctx.kinks.doubt < INFINITY:
         return
     estimate(side)
     for d in range(ctx.rows):
-        put(ctx.borders_behind, 8 * d, get(side.borders, 8 * d))
-        ctx.lasts_behind[d] = side.lasts[d]
-    ctx.border = SEEN
+        put(ctx.kinks.borders_behind, 8 * d, get(side.kinks.borders, 8 * d))
+        ctx.kinks.lasts_behind[d] = side.kinks.lasts[d]
+    ctx.kinks.border = SEEN
 
 
 @compiled
 def keep_end(ctx):
     """Keep what is known of the end of the step ahead, and where to go back to, before it is taken."""
-    ctx.borders, ctx.borders_behind = ctx.borders_behind, ctx.borders
-    ctx.lasts, ctx.lasts_behind = ctx.lasts_behind, ctx.lasts
-    ctx.border, ctx.border_ahead = ctx.border_ahead, NOTHING
-    ctx.behind_time, ctx.behind_low = ctx.t0, ctx.time_low
-    ctx.behind_on_surface = ctx.on_surface
+    behind, kinks = ctx.behind, ctx.kinks
+    kinks.borders, kinks.borders_behind = kinks.borders_behind, kinks.borders
+    kinks.lasts, kinks.lasts_behind = kinks.lasts_behind, kinks.lasts
+    kinks.border, kinks.border_ahead = kinks.border_ahead, NOTHING
+    behind.t0, behind.time_low = ctx.t0, ctx.time_low
+    behind.on_surface = ctx.surfaces.on_surface
 
 
 @compiled
 def undo(ctx):
     """Go back to before the step behind, for a shorter one; count the place of a kink in that."""
-    h = ctx.length_behind
-    ctx.state, ctx.behind_state = ctx.behind_state, ctx.state
-    ctx.error, ctx.behind_error = ctx.behind_error, ctx.error
-    ctx.t0, ctx.time_low, ctx.n = ctx.behind_time, ctx.behind_low, 0
-    ctx.next_length = RETREAT * h
-    ctx.length_behind = 0.0
-    ctx.border = NOTHING
-    ctx.on_surface, ctx.surface = AT_ORIGIN if ctx.behind_on_surface else 0, 0
-    ctx.undone = 0
-    ctx.steps -= 1
+    controller, behind = ctx.controller, ctx.behind
+    h = controller.length_behind
+    ctx.state, behind.state = behind.state, ctx.state
+    ctx.error, behind.error = behind.error, ctx.error
+    ctx.t0, ctx.time_low, ctx.n = behind.t0, behind.time_low, 0
+    controller.next_length = RETREAT * h
+    controller.length_behind = 0.0
+    ctx.kinks.border = NOTHING
+    ctx.surfaces.on_surface, ctx.surfaces.row = AT_ORIGIN if behind.on_surface else 0, 0
+    ctx.kinks.undone = 0
+    ctx.counters.steps -= 1
     forget(ctx)
     count(ctx, ctx.t0, h)
 
@@ -228,19 +230,19 @@ def forget(ctx):
     """Forget the step ahead."""
     ctx.solved = UNSOLVED
     ctx.length = 0.0
-    ctx.age = 0
-    ctx.rejections += 1
+    ctx.blocks.age = 0
+    ctx.counters.rejections += 1
 
 
 @compiled
 def holds(ctx):
     """Whether the field does not jump in the solved step beyond its nodes; else forget the step."""
-    if ctx.border_ahead != EXTRAPOLATED:
+    if ctx.kinks.border_ahead != EXTRAPOLATED:
         return True
     if not differs_at_an_end(ctx):
         return True
     count(ctx, ctx.t0, ctx.h)
-    ctx.next_length = SHRINK * ctx.h
+    ctx.controller.next_length = SHRINK * ctx.h
     forget(ctx)
     return False
 
@@ -248,12 +250,13 @@ def holds(ctx):
 @compiled
 def arrived(ctx):
     """Whether the field does not jump before the end of the step behind; else undo that."""
-    if ctx.border != EXTRAPOLATED:
+    controller = ctx.controller
+    if ctx.kinks.border != EXTRAPOLATED:
         return True
-    if ctx.breaks == 1 and abs(ctx.stop - ctx.t0) <= CLOSE * abs(ctx.stop):
+    if controller.breaks == 1 and abs(controller.stop - ctx.t0) <= CLOSE * abs(controller.stop):
         return True
     rows, lanes, second = ctx.rows, ctx.lanes, ctx.second
-    stages, times, values = ctx.old_stages, ctx.times, ctx.sums
+    stages, times, values = ctx.scratch.old_stages, ctx.times, ctx.scratch.sums
     for lane in range(lanes):
         times[lane] = ctx.t0
     for d in range(rows):
@@ -261,8 +264,8 @@ def arrived(ctx):
         for lane in range(lanes):
             stages[lanes * d + lane] = ctx.state[place]
     call_field(ctx.field, times, stages, ctx.par, values)
-    ctx.evaluations += 1
-    ctx.border = SEEN
+    ctx.counters.evaluations += 1
+    ctx.kinks.border = SEEN
     for d in range(rows):
         if misses(ctx, d, values[lanes * d]):
             undo(ctx)

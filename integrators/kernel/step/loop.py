@@ -1,17 +1,10 @@
 """Whole trajectories: steps to the times asked for."""
 
-from integrators.kernel.context import (
-    ALWAYS_IMPLICIT,
-    BUDGET,
-    DONE,
-    NOTHING,
-    STATE,
-    UNSEEN,
-    UNSOLVED,
-    Context,
-)
+from integrators.kernel.context import BUDGET, DONE, STATE, UNSEEN, UNSOLVED, Context
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
+from integrators.kernel.parts.implicit import ALWAYS_IMPLICIT
+from integrators.kernel.parts.kinks import NOTHING
 from integrators.kernel.simd.memory import put, splat8
 from integrators.kernel.step.act import begin_events, change, end_at_action, length_after_action
 from integrators.kernel.step.advance import looked, step, watched
@@ -45,7 +38,7 @@ def repeat(ctx, target, budget):
 @compiled
 def look_first(ctx):
     """Look for events in the solved step, if they may end it; the outcome."""
-    return end_at_action(ctx) if ctx.acts and ctx.seen == 0 else DONE
+    return end_at_action(ctx) if ctx.events.act and ctx.events.seen == 0 else DONE
 
 
 @compiled
@@ -54,7 +47,7 @@ def act(ctx):
     outcome = change(ctx)
     if outcome != DONE:
         return outcome
-    ctx.next_length, ctx.length_behind = length_after_action(ctx), 0.0
+    ctx.controller.next_length, ctx.controller.length_behind = length_after_action(ctx), 0.0
     begin_anew(ctx)
     return begin_events(ctx)
 
@@ -75,7 +68,7 @@ def approach(ctx, t, budget):
             rest = remaining(ctx, t)
         rest, h = abs(rest), abs(ctx.h)
         inside = rest < h - CLOSE * abs(t)
-        if (watched(ctx) or (inside and rest > (1.0 - ctx.nodes[0]) * h)) and not holds(ctx):
+        if (watched(ctx) or (inside and rest > (1.0 - ctx.tables.nodes[0]) * h)) and not holds(ctx):
             continue
         outcome = look_first(ctx)
         if outcome != DONE:
@@ -91,7 +84,7 @@ def approach(ctx, t, budget):
             return outcome, budget
         budget -= 1
         take(ctx)
-        if ctx.acting:
+        if ctx.events.acting:
             outcome = act(ctx)
             if outcome != DONE:
                 return outcome, budget
@@ -156,14 +149,14 @@ def walk(ctx, times, out, budget):
     shorten_first(ctx)
     while True:
         ctx.made = made
-        taken = ctx.steps
+        taken = ctx.counters.steps
         outcome = DONE
         over = remaining(ctx, end) == 0.0 or made == budget > 0
         if over and arrived(ctx):
             return DONE if remaining(ctx, end) == 0.0 else BUDGET
         if not over:
             outcome = ready(ctx)
-        if ctx.steps < taken:
+        if ctx.counters.steps < taken:
             made -= 1
             ctx.made = made
         if outcome != DONE:
@@ -181,7 +174,7 @@ def walk(ctx, times, out, budget):
         if outcome != DONE:
             return outcome
         take(ctx)
-        if ctx.acting:
+        if ctx.events.acting:
             outcome = act(ctx)
         times[made] = ctx.t0
         write(ctx, ctx.state, out + dim * made)
@@ -210,22 +203,23 @@ def reset(ctx, start):
 @compiled
 def begin_anew(ctx):
     """Begin at the present state, at t0: no history."""
-    if ctx.energy_code:
+    solver, implicit = ctx.solver, ctx.implicit
+    if ctx.energy.code:
         take_energy(ctx)
     set_factors(ctx, ctx.h)
     ctx.length = ctx.older_length = 0.0
-    ctx.n = ctx.age = ctx.free = 0
+    ctx.n = ctx.blocks.age = solver.free = 0
     ctx.solved = UNSOLVED
-    ctx.border = ctx.border_ahead = NOTHING
+    ctx.kinks.border = ctx.kinks.border_ahead = NOTHING
     find_surface(ctx)
-    ctx.outcome = DONE
-    ctx.time_low, ctx.rate = 0.0, FIRST_RATE
-    if ctx.strategy != ALWAYS_IMPLICIT:
-        ctx.implicit = ctx.slow = ctx.held = ctx.left = 0
+    solver.outcome = DONE
+    ctx.time_low, solver.rate = 0.0, FIRST_RATE
+    if implicit.strategy != ALWAYS_IMPLICIT:
+        implicit.active = implicit.slow = implicit.held = implicit.left = 0
     arrive(ctx)
-    if ctx.pace:
+    if ctx.pace.code:
         begin_pace(ctx)
-    elif ctx.varying and ctx.next_length == 0.0:
-        ctx.next_length = first_length(ctx)
+    elif ctx.varying and ctx.controller.next_length == 0.0:
+        ctx.controller.next_length = first_length(ctx)
         shorten_first(ctx)
-        ctx.age = 0
+        ctx.blocks.age = 0

@@ -21,20 +21,21 @@ SMALL = 1e-16
 
 @compiled
 def evaluate_energy(ctx, state):
-    """Set `Context.energy_found` to the gradient at a state, and then the energy; return that."""
-    rows = ctx.energy_rows - 1
-    places, given, found = ctx.energy_places, ctx.energy_state, ctx.energy_found
+    """Set `Energy.found` to the gradient at a state, and then the energy; return that."""
+    energy = ctx.energy
+    rows = energy.rows - 1
+    places, given, found = energy.places, energy.state, energy.found
     for i in range(rows):
         put(given, 8 * i, splat8(state[places[i]]))
-    call_field(ctx.energy_code, ctx.times, given, ctx.par, found)
+    call_field(energy.code, ctx.times, given, ctx.par, found)
     return found[8 * rows]
 
 
 @compiled
 def block_size(ctx, first):
     """Return the size of the block that begins at a component, in the state that is evaluated."""
-    given, size = ctx.energy_state, 0.0
-    for i in range(first, first + ctx.energy_width):
+    given, size = ctx.energy.state, 0.0
+    for i in range(first, first + ctx.energy.width):
         size = max(size, abs(given[8 * i]))
     return size
 
@@ -42,21 +43,23 @@ def block_size(ctx, first):
 @compiled
 def take_energy(ctx):
     """Let steps end with the energy of the present state, and take how much of it the components make."""
-    ctx.energy = evaluate_energy(ctx, ctx.state)
+    energy = ctx.energy
+    energy.start = evaluate_energy(ctx, ctx.state)
     top = 0.0
-    for i in range(ctx.energy_rows - 1):
-        first = i - i % ctx.energy_width
-        top = max(top, block_size(ctx, first) * abs(ctx.energy_found[8 * i]))
-    ctx.energy_scale = 1.0 / top if top > SMALLEST else 1.0
+    for i in range(energy.rows - 1):
+        first = i - i % energy.width
+        top = max(top, block_size(ctx, first) * abs(energy.found[8 * i]))
+    energy.scale = 1.0 / top if top > SMALLEST else 1.0
 
 
 @compiled
 def project_onto_energy(ctx):
-    """Move the next state to the energy `Context.energy`; leave it where its energy cannot be changed so."""
-    rows, width, scale = ctx.energy_rows - 1, ctx.energy_width, ctx.energy_scale
-    places, slope, state, error = ctx.energy_places, ctx.energy_found, ctx.next_state, ctx.next_error
+    """Move the next state to the energy `Energy.start`; leave it where its energy cannot be changed so."""
+    energy = ctx.energy
+    rows, width, scale = energy.rows - 1, energy.width, energy.scale
+    places, slope, state, error = energy.places, energy.found, ctx.next_state, ctx.next_error
     for _ in range(MOST_CORRECTIONS):
-        gap = evaluate_energy(ctx, state) - ctx.energy
+        gap = evaluate_energy(ctx, state) - energy.start
         steepness = 0.0
         for first in range(0, rows, width):
             size = block_size(ctx, first)

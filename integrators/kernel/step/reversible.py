@@ -23,16 +23,17 @@ NEWTON = 8  # iterations; 4 suffice for growth by factors of 1/3 to 3
 @compiled
 def find_slope(ctx):
     """Set what the logarithm of the density grows by at the state; return the field's rate there."""
-    state, lanes, rows, values = ctx.pace_state, ctx.lanes, ctx.rows, ctx.pace_values
-    for d in range(ctx.pace_rows):
+    pace = ctx.pace
+    state, lanes, rows, values = pace.state, ctx.lanes, ctx.rows, pace.values
+    for d in range(pace.rows):
         place = d
         if ctx.second:
             i = d % rows
             place = 8 * (i // 4) + i % 4 + (4 if d < rows else 0)
         for lane in range(lanes):
             state[lanes * d + lane] = ctx.state[place]
-    call_field(ctx.pace, ctx.pace_times, state, ctx.pace_par, values)
-    ctx.density_slope = values[lanes]
+    call_field(pace.code, pace.times, state, pace.par, values)
+    pace.density_slope = values[lanes]
     return values[0] ** 0.25
 
 
@@ -49,22 +50,24 @@ def growth(c):
 @compiled
 def set_pace(ctx, behind, ahead):
     """Set the logarithms of the densities of the step behind and of that ahead, and its length."""
-    ctx.log_density_behind, ctx.log_density = behind, ahead
-    ctx.next_length = ctx.epsilon * exp(-ahead)
+    pace = ctx.pace
+    pace.log_density_behind, pace.log_density = behind, ahead
+    ctx.controller.next_length = pace.epsilon * exp(-ahead)
 
 
 @compiled
 def begin_pace(ctx):
     """Set the density of the first step, and its length."""
     rate = find_slope(ctx)
-    half = 0.5 * ctx.epsilon * ctx.density_slope / rate
+    half = 0.5 * ctx.pace.epsilon * ctx.pace.density_slope / rate
     set_pace(ctx, log(rate) - half, log(rate) + half)
-    ctx.restful = 0
+    ctx.controller.restful = 0
 
 
 @compiled
 def keep_pace(ctx):
     """Set the density of the next step after one is taken, and its length."""
+    pace = ctx.pace
     find_slope(ctx)
-    behind = ctx.log_density
-    set_pace(ctx, behind, behind + growth(2.0 * ctx.epsilon * ctx.density_slope * exp(-behind)))
+    behind = pace.log_density
+    set_pace(ctx, behind, behind + growth(2.0 * pace.epsilon * pace.density_slope * exp(-behind)))

@@ -67,9 +67,10 @@ def interpolate(ctx, c, out):
     second-order form the positions take the integrals of that polynomial's slope,
     projected like it: q + c h q' + h kh sum_j gamma_j (int_0^c P) X_s, column j.
     """
+    tables = ctx.tables
     rows, second, h = ctx.rows, ctx.second, ctx.h
-    state, gamma = ctx.state, ctx.coefficients
-    project(ctx, ctx.projection, ctx.groups)
+    state, gamma = ctx.state, ctx.scratch.coefficients
+    project(ctx, tables.projection, tables.groups)
     write(ctx, ctx.error, out)
     x = 2.0 * c - 1.0
     # Integrals of P_{j-1}, P_j, P_{j+1}, by int_0^c L_j = (L_{j+1} - L_{j-1}) / (2 (2j+1)) for j > 0.
@@ -81,11 +82,11 @@ def interpolate(ctx, c, out):
         slope_weight = h * here
         weight = 0.5 * here if j == 0 else -lower / (2.0 * (4.0 * j * j - 1.0) ** 0.5)
         weight = h * (weight + upper / (2.0 * (4.0 * (j + 1.0) * (j + 1.0) - 1.0) ** 0.5))
-        i = ctx.first + j
+        i = tables.first + j
         for d in range(rows):
             value = gamma[((i // 8) * ctx.padded + d) * 8 + i % 8]
             if second:
-                out[d] = out[d] + ctx.row_factor[d] * (weight * value)
+                out[d] = out[d] + ctx.factors.row[d] * (weight * value)
                 out[rows + d] = out[rows + d] + slope_weight * value
             else:
                 out[d] = out[d] + slope_weight * value
@@ -94,7 +95,7 @@ def interpolate(ctx, c, out):
     for d in range(rows):
         if second:
             i = 8 * (d // 4) + d % 4
-            drift = c * (ctx.drift_factor[i] * state[i])
+            drift = c * (ctx.factors.drift[i] * state[i])
             out[d] = state[i + 4] + (drift + out[d])
             out[rows + d] = state[i] + out[rows + d]
         else:
@@ -121,13 +122,14 @@ def part_step(ctx, side, part, known):
         predict(side, ctx, ctx.h, 0.0)
     else:
         predict(side, ctx, ctx.length, 1.0)
-    side.rescaled = ctx.rescaled
-    side.energy, side.energy_scale = ctx.energy, ctx.energy_scale
-    if ctx.rescaled:
-        for b in range(ctx.block_count):
-            side.expected[b] = ctx.expected[b]
+    side.estimate.rescaled = ctx.estimate.rescaled
+    side.energy.start, side.energy.scale = ctx.energy.start, ctx.energy.scale
+    if ctx.estimate.rescaled:
+        for b in range(ctx.blocks.count):
+            side.estimate.expected[b] = ctx.estimate.expected[b]
     take_sizes(side)
-    side.rate = ctx.rate  # not that of another partial step: states depend on nothing but where they are
+    # Not that of another partial step: states depend on nothing but where they are.
+    side.solver.rate = ctx.solver.rate
     outcome = settle_part(ctx, side)
     return finish(side) if outcome == DONE else outcome
 
@@ -147,11 +149,11 @@ def changes(ctx):
 @compiled
 def add_counters(ctx, side):
     """Count the work done in ``side`` as that of ``ctx``."""
-    ctx.iterations += side.iterations
-    ctx.evaluations += side.evaluations
-    ctx.restarts += side.restarts
-    side.iterations = side.evaluations = side.restarts = 0
-    ctx.partial += 1
+    ctx.counters.iterations += side.counters.iterations
+    ctx.counters.evaluations += side.counters.evaluations
+    ctx.counters.restarts += side.counters.restarts
+    side.counters.iterations = side.counters.evaluations = side.counters.restarts = 0
+    ctx.counters.partial_steps += 1
 
 
 @compiled
@@ -167,10 +169,10 @@ def land(ctx, side, t):
     copy(side.next_error, ctx.error, vectors_of_state(ctx))
     copy(side.values, ctx.values, ctx.calls * ctx.padded * ctx.lanes // 8)
     ctx.length, ctx.older_length = side.h, 0.0
-    ctx.on_surface = 0
+    ctx.surfaces.on_surface = 0
     if ctx.varying:
         keep_end_of_part(ctx, side)
-        ctx.length_behind = side.h
+        ctx.controller.length_behind = side.h
     set_time(ctx, t)
     ctx.solved = UNSOLVED
     arrive(ctx)
@@ -207,10 +209,10 @@ def sample(ctx, side, between, t, part, out):
         return DONE
     outcome = part_step(ctx, side, part, 0.0)
     add_counters(ctx, side)
-    if outcome == DONE and ctx.varying and ctx.blind and ctx.acts == 0 and changes(side):
+    if outcome == DONE and ctx.varying and ctx.estimate.blind and ctx.events.act == 0 and changes(side):
         # The step ahead was judged by nodes that see nothing of this: it is solved again, and no longer.
-        ctx.solved, ctx.length, ctx.next_length = UNSOLVED, 0.0, part
-        ctx.rejections += 1
+        ctx.solved, ctx.length, ctx.controller.next_length = UNSOLVED, 0.0, part
+        ctx.counters.rejections += 1
         return UNSEEN
     if outcome == DONE:
         outcome = followed(ctx, side, PART_END)

@@ -17,7 +17,7 @@ SIZES_LAST = 8  # steps for which the sizes of the blocks are good
 @compiled
 def change(ctx, scale):
     """Return the largest of the stages' change in size, each row times its scale; NaN if any is."""
-    new, old = ctx.stages, ctx.old_stages
+    new, old = ctx.stages, ctx.scratch.old_stages
     rows, lanes = ctx.rows, ctx.lanes
     top = splat8(0.0)
     for chunk in range(ctx.chunks):
@@ -40,7 +40,7 @@ def stage_size(ctx, d, least):
 @compiled
 def stage_movement(ctx, d):
     """Return how far row d of the stages is from the state, at most."""
-    top, lanes, start = splat8(0.0), ctx.lanes, spread(ctx.row_state, d)
+    top, lanes, start = splat8(0.0), ctx.lanes, spread(ctx.scratch.row_state, d)
     for chunk in range(ctx.chunks):
         top = max(top, abs(get(ctx.stages, offset(ctx, chunk) + lanes * d) - start))
     return largest(top)
@@ -49,19 +49,21 @@ def stage_movement(ctx, d):
 @compiled
 def forget_sizes(ctx):
     """Begin to measure blocks."""
-    for b in range(ctx.block_count):
-        ctx.size[b] = 0.0
-    for g in range(ctx.group_count):
-        ctx.largest[g] = ctx.farthest[g] = 0.0
+    blocks = ctx.blocks
+    for b in range(blocks.count):
+        blocks.size[b] = 0.0
+    for g in range(blocks.groups):
+        blocks.largest[g] = blocks.farthest[g] = 0.0
 
 
 @compiled
 def enter_size(ctx, d, value):
     """Let the block of row d have at least the size ``value``."""
-    b = ctx.block[d]
-    g = ctx.group[b]
-    ctx.size[b] = max(ctx.size[b], value)
-    ctx.largest[g] = max(ctx.largest[g], value)
+    blocks = ctx.blocks
+    b = blocks.of_row[d]
+    g = blocks.group[b]
+    blocks.size[b] = max(blocks.size[b], value)
+    blocks.largest[g] = max(blocks.largest[g], value)
 
 
 @for_both_widths
@@ -92,27 +94,29 @@ def inverse_sizes(size, largest, least, expected, absolute):
 @compiled
 def invert_sizes(ctx, strict, floored):
     """Write the inverse sizes of all rows, by both measures; return whether all blocks have a size."""
+    blocks, estimate = ctx.blocks, ctx.estimate
     known = True
     least = NOTHING if ctx.varying else 0.0
     for d in range(ctx.rows):
-        b = ctx.block[d]
-        expected = ctx.expected[b] if ctx.rescaled else 0.0
-        g = ctx.group[b]
-        unimportant = max(ctx.absolute[b], ctx.farthest[g])
-        strict[d], floored[d] = inverse_sizes(ctx.size[b], ctx.largest[g], least, expected, unimportant)
-        known = known and ctx.size[b] > SMALLEST
+        b = blocks.of_row[d]
+        expected = estimate.expected[b] if estimate.rescaled else 0.0
+        g = blocks.group[b]
+        unimportant = max(estimate.absolute[b], blocks.farthest[g])
+        strict[d], floored[d] = inverse_sizes(blocks.size[b], blocks.largest[g], least, expected, unimportant)
+        known = known and blocks.size[b] > SMALLEST
     return known
 
 
 @compiled
 def take_sizes(ctx):
     """Measure the blocks on the present stages: changes are judged relative to them."""
+    blocks = ctx.blocks
     forget_sizes(ctx)
     for d in range(ctx.rows):
         enter_size(ctx, d, stage_size(ctx, d, splat8(0.0)))
-    if ctx.varying == 0 and ctx.block_count == ctx.rows:
+    if ctx.varying == 0 and blocks.count == ctx.rows:
         for d in range(ctx.rows):
-            g = ctx.group[ctx.block[d]]
-            ctx.farthest[g] = max(ctx.farthest[g], stage_movement(ctx, d))
-    known = invert_sizes(ctx, ctx.strict, ctx.floored)
-    ctx.age = SIZES_LAST if known else 0
+            g = blocks.group[blocks.of_row[d]]
+            blocks.farthest[g] = max(blocks.farthest[g], stage_movement(ctx, d))
+    known = invert_sizes(ctx, blocks.weights, blocks.floored_weights)
+    blocks.age = SIZES_LAST if known else 0

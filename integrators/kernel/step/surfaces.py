@@ -6,8 +6,9 @@ whose nodes are on one side tells where, a little beyond its end too. The next s
 Where the field there pushes back to the surface, the trajectory would slide along it, or stick.
 """
 
-from integrators.kernel.context import AT_ORIGIN, DONE, END_ACROSS, MOST_SIDES, NO_SURFACE
+from integrators.kernel.context import DONE
 from integrators.kernel.native.jit import compiled
+from integrators.kernel.parts.surfaces import AT_ORIGIN, END_ACROSS, MOST_SIDES, NO_SURFACE
 from integrators.kernel.simd.memory import call_field
 from integrators.kernel.step.begin import INFINITY
 from integrators.kernel.step.control import SHORTEST
@@ -15,7 +16,7 @@ from integrators.kernel.step.kinks import end_behind
 from integrators.kernel.step.sample import interpolate
 
 # What comes of a step that crosses a surface, or was to end on one: judged like all others; tried again with
-# `Context.next_length`; it ends on the surface.
+# `Controller.next_length`; it ends on the surface.
 ORDINARY, AGAIN, LANDED = range(3)
 
 MOST_TRIALS = 16  # of lengths of a step
@@ -36,49 +37,50 @@ def is_number(x):
 def value_at_node(ctx, i, j):
     """Return output i of the sides at node j."""
     call, lane = j // ctx.lanes, j % ctx.lanes
-    return ctx.side_values[ctx.lanes * (MOST_SIDES * call + i) + lane]
+    return ctx.surfaces.values[ctx.lanes * (MOST_SIDES * call + i) + lane]
 
 
 @compiled
 def value_at(ctx, i, j):
     """Return output i of the sides at the start, j = -1, or at node j."""
-    return ctx.side_ends[ctx.lanes * i] if j < 0 else value_at_node(ctx, i, j)
+    return ctx.surfaces.ends[ctx.lanes * i] if j < 0 else value_at_node(ctx, i, j)
 
 
 @compiled
 def first_point(ctx):
     """Return the first point that tells on which side a step is: a start on a surface tells nothing."""
-    return 0 if ctx.on_surface else -1
+    return 0 if ctx.surfaces.on_surface else -1
 
 
 @compiled
 def look_across(ctx, outcome):
-    """Set and return `Context.across`: the first node on another side than the start, if any."""
+    """Set and return `Surfaces.across`: the first node on another side than the start, if any."""
+    surfaces = ctx.surfaces
     lanes, rows, second = ctx.lanes, ctx.rows, ctx.second
     size = lanes * ctx.padded
     for call in range(ctx.calls):
-        values = ctx.side_values + lanes * MOST_SIDES * call
-        call_field(ctx.sides, ctx.times + lanes * call, ctx.stages + size * call, ctx.par, values)
-    times, ends = ctx.side_times, ctx.sums
+        values = surfaces.values + lanes * MOST_SIDES * call
+        call_field(surfaces.code, ctx.times + lanes * call, ctx.stages + size * call, ctx.par, values)
+    times, ends = surfaces.times, ctx.scratch.sums
     for lane in range(lanes):
         times[lane] = ctx.t0 + (ctx.h if lane else 0.0)
     for d in range(rows):
         place = 8 * (d // 4) + 4 + d % 4 if second else d
-        ends[lanes * d] = ctx.row_state[d]
+        ends[lanes * d] = ctx.scratch.row_state[d]
         for lane in range(1, lanes):
             ends[lanes * d + lane] = ctx.next_state[place]
-    call_field(ctx.sides, times, ends, ctx.par, ctx.side_ends)
-    ctx.across = NO_SURFACE
+    call_field(surfaces.code, times, ends, ctx.par, surfaces.ends)
+    surfaces.across = NO_SURFACE
     here = value_at(ctx, 0, first_point(ctx))
     for j in range(ctx.k):
         value = value_at_node(ctx, 0, j)
         if value != here:
             if is_number(value):
-                ctx.across = j
-            return ctx.across
-    if outcome == DONE and ctx.side_ends[1] != here:
-        ctx.across = END_ACROSS
-    return ctx.across
+                surfaces.across = j
+            return surfaces.across
+    if outcome == DONE and surfaces.ends[1] != here:
+        surfaces.across = END_ACROSS
+    return surfaces.across
 
 
 @compiled
@@ -93,37 +95,38 @@ def locate(ctx, outcome, fits):
     fits : bool
         Whether its errors are small enough.
     """
+    surfaces = ctx.surfaces
     h = abs(ctx.h)
-    first = ctx.locating == 0
+    first = surfaces.locating == 0
     if first:
-        ctx.near, ctx.far, ctx.apart_from_surface = 0.0, INFINITY, INFINITY
-        ctx.length_wanted = ctx.h
-    ctx.locating += 1
-    if ctx.locating > MOST_TRIALS:
+        surfaces.near, surfaces.far, surfaces.distance = 0.0, INFINITY, INFINITY
+        surfaces.length_wanted = ctx.h
+    surfaces.locating += 1
+    if surfaces.locating > MOST_TRIALS:
         return ORDINARY
-    if ctx.across >= 0:
-        ctx.far = min(ctx.far, h)
+    if surfaces.across >= 0:
+        surfaces.far = min(surfaces.far, h)
         length = first_crossing(ctx) * h
-        if not ctx.near < length:
-            length = 0.5 * (ctx.near + h)
+        if not surfaces.near < length:
+            length = 0.5 * (surfaces.near + h)
         return try_length(ctx, length)
-    if outcome != DONE or not (fits or (first and ctx.across == END_ACROSS)):
+    if outcome != DONE or not (fits or (first and surfaces.across == END_ACROSS)):
         return ORDINARY
     part = part_to_surface(ctx)
     if part == 0.0:
         return ORDINARY
     apart = abs(part - 1.0)
-    if apart <= ROUNDED or (apart <= NEARLY and apart >= FALLS * ctx.apart_from_surface):
+    if apart <= ROUNDED or (apart <= NEARLY and apart >= FALLS * surfaces.distance):
         return LANDED if fits else ORDINARY
-    ctx.apart_from_surface = apart
+    surfaces.distance = apart
     length = part * h
-    if ctx.across == NO_SURFACE:
-        ctx.near = max(ctx.near, h)
-        if length >= ctx.far:
-            length = 0.5 * (h + ctx.far)
+    if surfaces.across == NO_SURFACE:
+        surfaces.near = max(surfaces.near, h)
+        if length >= surfaces.far:
+            length = 0.5 * (h + surfaces.far)
             if length - h <= NEARLY * h:
                 return ORDINARY
-        if length > ctx.longest or length > abs((ctx.stop - ctx.t0) - ctx.time_low):
+        if length > ctx.controller.longest or length > abs((ctx.controller.stop - ctx.t0) - ctx.time_low):
             return ORDINARY
     return try_length(ctx, length)
 
@@ -133,7 +136,7 @@ def try_length(ctx, length):
     """Let the next attempt have a length; ORDINARY if that is too short."""
     if not length > SHORTEST * abs(ctx.t0):
         return ORDINARY
-    ctx.next_length = length if ctx.h > 0.0 else -length
+    ctx.controller.next_length = length if ctx.h > 0.0 else -length
     return AGAIN
 
 
@@ -141,14 +144,15 @@ def try_length(ctx, length):
 def first_crossing(ctx):
     """Return the part of the step after which a surface is crossed, from the distances at nodes.
 
-    Sets `Context.surface`, the row of the distance that vanishes there.
+    Sets `Surfaces.row`, the row of the distance that vanishes there.
     """
-    j = ctx.across
+    surfaces = ctx.surfaces
+    j = surfaces.across
     before = j - 1 if j > 0 else first_point(ctx)
-    low = 0.0 if before < 0 or before == j else ctx.nodes[before]
-    high = ctx.nodes[j]
+    low = 0.0 if before < 0 or before == j else ctx.tables.nodes[before]
+    high = ctx.tables.nodes[j]
     part, changes = high, 0
-    for i in range(1, 1 + ctx.surfaces):
+    for i in range(1, 1 + surfaces.count):
         a, b = value_at(ctx, i, before), value_at(ctx, i, j)
         change = 1 if (a < 0.0) != (b < 0.0) else 0
         if change < changes:
@@ -156,7 +160,7 @@ def first_crossing(ctx):
         reaches = low + (high - low) * abs(a) / (abs(a) + abs(b))
         if change > changes or reaches <= part:
             part, changes = reaches, change
-            ctx.surface = i
+            surfaces.row = i
     return part if part > low else 0.5 * (low + high)
 
 
@@ -166,21 +170,22 @@ def part_to_surface(ctx):
 
     Of all surfaces that are known to be crossed, the first.
     """
-    if ctx.surface == 0 or ctx.across == END_ACROSS:
+    surfaces = ctx.surfaces
+    if surfaces.row == 0 or surfaces.across == END_ACROSS:
         here = value_at(ctx, 0, first_point(ctx))
         earliest, row = INFINITY, 0
-        for i in range(1, 1 + ctx.surfaces):
-            a, b = value_at_node(ctx, i, ctx.k - 1), ctx.side_ends[ctx.lanes * i + 1]
-            if (a < 0.0) != (b < 0.0) or (i == ctx.surface and ctx.side_ends[1] != here):
+        for i in range(1, 1 + surfaces.count):
+            a, b = value_at_node(ctx, i, ctx.k - 1), surfaces.ends[ctx.lanes * i + 1]
+            if (a < 0.0) != (b < 0.0) or (i == surfaces.row and surfaces.ends[1] != here):
                 part = abs(a) / (abs(a) + abs(b))
                 if part < earliest:
                     earliest, row = part, i
         if row:
-            ctx.surface = row
-    if ctx.surface == 0:
+            surfaces.row = row
+    if surfaces.row == 0:
         return 0.0
     here = value_at(ctx, 0, first_point(ctx))
-    before, at = ctx.nodes[ctx.k - 1], 1.0
+    before, at = ctx.tables.nodes[ctx.k - 1], 1.0
     value_before, value = distance_at(ctx, before, here), distance_at(ctx, at, here)
     for _ in range(SECANTS):
         if value == 0.0:
@@ -201,29 +206,31 @@ def part_to_surface(ctx):
 
 @compiled
 def distance_at(ctx, c, here):
-    """Return the distance from `Context.surface` at part c of the step, negative beyond it."""
-    lanes, state = ctx.lanes, ctx.side_state
+    """Return the distance from `Surfaces.row` at part c of the step, negative beyond it."""
+    surfaces = ctx.surfaces
+    lanes, state = ctx.lanes, surfaces.state
     interpolate(ctx, c, state)
     for lane in range(lanes):
-        ctx.side_times[lane] = ctx.t0 + c * ctx.h
+        surfaces.times[lane] = ctx.t0 + c * ctx.h
         for d in range(ctx.rows):
-            ctx.sums[lanes * d + lane] = state[d]
-    call_field(ctx.sides, ctx.side_times, ctx.sums, ctx.par, ctx.side_between)
-    size = abs(ctx.side_between[lanes * ctx.surface])
-    return size if ctx.side_between[0] == here else -size
+            ctx.scratch.sums[lanes * d + lane] = state[d]
+    call_field(surfaces.code, surfaces.times, ctx.scratch.sums, ctx.par, surfaces.between)
+    size = abs(surfaces.between[lanes * surfaces.row])
+    return size if surfaces.between[0] == here else -size
 
 
 @compiled
 def find_surface(ctx):
-    """Set `Context.on_surface` at a trajectory's start, and the row of the surface that it is on."""
-    ctx.on_surface = ctx.landing = ctx.surface = ctx.locating = 0
-    if ctx.sides == 0:
+    """Set `Surfaces.on_surface` at a trajectory's start, and the row of the surface that it is on."""
+    surfaces = ctx.surfaces
+    surfaces.on_surface = surfaces.reached = surfaces.row = surfaces.locating = 0
+    if surfaces.code == 0:
         return
     spread_state(ctx, ctx.t0)
-    call_field(ctx.sides, ctx.side_times, ctx.sums, ctx.par, ctx.side_between)
-    for i in range(1, 1 + ctx.surfaces):
-        if ctx.side_between[ctx.lanes * i] == 0.0:
-            ctx.on_surface, ctx.surface = AT_ORIGIN, i
+    call_field(surfaces.code, surfaces.times, ctx.scratch.sums, ctx.par, surfaces.between)
+    for i in range(1, 1 + surfaces.count):
+        if surfaces.between[ctx.lanes * i] == 0.0:
+            surfaces.on_surface, surfaces.row = AT_ORIGIN, i
 
 
 @compiled
@@ -231,9 +238,9 @@ def spread_state(ctx, t):
     """Put the present state and a time to all lanes."""
     lanes, second = ctx.lanes, ctx.second
     for lane in range(lanes):
-        ctx.side_times[lane] = t
+        ctx.surfaces.times[lane] = t
         for d in range(ctx.rows):
-            ctx.sums[lanes * d + lane] = ctx.state[8 * (d // 4) + 4 + d % 4 if second else d]
+            ctx.scratch.sums[lanes * d + lane] = ctx.state[8 * (d // 4) + 4 + d % 4 if second else d]
 
 
 @compiled
@@ -243,35 +250,36 @@ def leave(ctx):
     It does not where the field pushes back to the surface beyond it. Where a force depends on positions
     alone, nothing pushes at once.
     """
-    lanes, rows, values, h = ctx.lanes, ctx.rows, ctx.values, ctx.next_length
+    surfaces, scratch = ctx.surfaces, ctx.scratch
+    lanes, rows, values, h = ctx.lanes, ctx.rows, ctx.values, ctx.controller.next_length
     move = NUDGE * h
     spread_state(ctx, ctx.t0)
     if ctx.second:
         for d in range(rows):
-            velocity = ctx.velocity[d] * ctx.state[8 * (d // 4) + d % 4]
+            velocity = ctx.factors.velocity[d] * ctx.state[8 * (d // 4) + d % 4]
             for lane in range(lanes):
-                ctx.sums[lanes * d + lane] += move * velocity
+                scratch.sums[lanes * d + lane] += move * velocity
     else:
-        if ctx.on_surface == AT_ORIGIN:
-            call_field(ctx.field, ctx.side_times, ctx.sums, ctx.par, values)
-            ctx.evaluations += 1
+        if surfaces.on_surface == AT_ORIGIN:
+            call_field(ctx.field, surfaces.times, scratch.sums, ctx.par, values)
+            ctx.counters.evaluations += 1
         for d in range(rows):
-            slope = values[lanes * d] if ctx.on_surface == AT_ORIGIN else end_behind(ctx, d)
+            slope = values[lanes * d] if surfaces.on_surface == AT_ORIGIN else end_behind(ctx, d)
             for lane in range(lanes):
-                ctx.sums[lanes * d + lane] += move * slope
-    call_field(ctx.field, ctx.side_times, ctx.sums, ctx.par, values)
-    ctx.evaluations += 1
+                scratch.sums[lanes * d + lane] += move * slope
+    call_field(ctx.field, surfaces.times, scratch.sums, ctx.par, values)
+    ctx.counters.evaluations += 1
     leaves = True
     if ctx.second == 0:
         for d in range(rows):
-            ctx.sums[lanes * d + 1] += move * values[lanes * d]
-        call_field(ctx.sides, ctx.side_times, ctx.sums, ctx.par, ctx.side_between)
-        found, i = ctx.side_between, lanes * ctx.surface
+            scratch.sums[lanes * d + 1] += move * values[lanes * d]
+        call_field(surfaces.code, surfaces.times, scratch.sums, ctx.par, surfaces.between)
+        found, i = surfaces.between, lanes * surfaces.row
         leaves = found[1] == found[0] and abs(found[i + 1]) >= abs(found[i])
     for call in range(ctx.calls):
         for d in range(rows):
             value, start = values[lanes * d], lanes * (ctx.padded * call + d)
             for lane in range(lanes):
                 values[start + lane] = value
-    ctx.length, ctx.rejected, ctx.age = h, 1, 0
+    ctx.length, ctx.controller.rejected, ctx.blocks.age = h, 1, 0
     return leaves

@@ -45,13 +45,13 @@ def evaluate(ctx):
 def product8(ctx, table):
     """Stages = state + (base + kh * table values), for eight of them."""
     matrix = columns(table, 0, 8)
-    stages, values, base, state = ctx.stages, ctx.values, ctx.base, ctx.row_state
+    stages, values, base, state = ctx.stages, ctx.values, ctx.scratch.base, ctx.scratch.row_state
     rows = ctx.rows
     if ctx.unit:
         for d in range(rows):
             put(stages, 8 * d, spread(state, d) + combine(matrix, values, 8 * d, get(base, 8 * d)))
     else:
-        factor = ctx.row_factor
+        factor = ctx.factors.row
         for d in range(rows):
             moved = fma(spread(factor, d), combine_only(matrix, values, 8 * d), get(base, 8 * d))
             put(stages, 8 * d, spread(state, d) + moved)
@@ -61,7 +61,13 @@ def product8(ctx, table):
 def product_of_two(ctx, table, older):
     """As `product8`, of the values of two steps."""
     before, last = columns(table, 0, 8), columns(table, 64, 8)
-    stages, values, base, state, factor = ctx.stages, ctx.values, ctx.base, ctx.row_state, ctx.row_factor
+    stages, values, base, state, factor = (
+        ctx.stages,
+        ctx.values,
+        ctx.scratch.base,
+        ctx.scratch.row_state,
+        ctx.factors.row,
+    )
     unit = ctx.unit
     for d in range(ctx.rows):
         sums = combine(last, values, 8 * d, combine_only(before, older, 8 * d))
@@ -72,8 +78,8 @@ def product_of_two(ctx, table, older):
 @compiled
 def product16(ctx, table):
     """Stages = state + (base + kh * table values), for sixteen of them, eight at a time."""
-    stages, values, base, state = ctx.stages, ctx.values, ctx.base, ctx.row_state
-    factor, rows, unit = ctx.row_factor, ctx.rows, ctx.unit
+    stages, values, base, state = ctx.stages, ctx.values, ctx.scratch.base, ctx.scratch.row_state
+    factor, rows, unit = ctx.factors.row, ctx.rows, ctx.unit
     for half in range(2):
         matrix = columns(table, 128 * half, 16)
         shift = 8 * half
@@ -91,8 +97,8 @@ def product16(ctx, table):
 @compiled
 def product_for_one(ctx, table):
     """As `product8` and `product16`, with a table for a step of length 1."""
-    stages, values, base, state = ctx.stages, ctx.values, ctx.base, ctx.row_state
-    factor, rows, h = ctx.row_factor, ctx.rows, ctx.h
+    stages, values, base, state = ctx.stages, ctx.values, ctx.scratch.base, ctx.scratch.row_state
+    factor, rows, h = ctx.factors.row, ctx.rows, ctx.h
     if ctx.route == 8:
         matrix = columns(table, 0, 8)
         for d in range(rows):
@@ -129,17 +135,18 @@ def multiply(table, chunks, groups, source, source_lanes, target, target_lanes, 
 def project(ctx, table, groups):
     """Coefficients = table values."""
     rows, padded = ctx.rows, ctx.padded
-    multiply(table, groups, ctx.chunks, ctx.values, ctx.lanes, ctx.coefficients, 8, rows, padded)
+    multiply(table, groups, ctx.chunks, ctx.values, ctx.lanes, ctx.scratch.coefficients, 8, rows, padded)
 
 
 @compiled
 def displace(ctx):
     """Stages = state + (base + kh * sums)."""
+    scratch = ctx.scratch
     rows, lanes = ctx.rows, ctx.lanes
-    state, factor = ctx.row_state, ctx.row_factor
+    state, factor = scratch.row_state, ctx.factors.row
     for chunk in range(ctx.chunks):
         start = offset(ctx, chunk)
-        stages, base, sums = ctx.stages + start, ctx.base + start, ctx.sums + start
+        stages, base, sums = ctx.stages + start, scratch.base + start, scratch.sums + start
         for d in range(rows):
             i = lanes * d
             put(stages, i, spread(state, d) + fma(spread(factor, d), get(sums, i), get(base, i)))
@@ -150,7 +157,9 @@ def through(ctx, projection, groups, table):
     """Stages by way of coefficients: far fewer operations where s is far below k."""
     rows, padded = ctx.rows, ctx.padded
     project(ctx, projection, groups)
-    multiply(table, ctx.chunks, groups, ctx.coefficients, 8, ctx.sums, ctx.lanes, rows, padded)
+    multiply(
+        table, ctx.chunks, groups, ctx.scratch.coefficients, 8, ctx.scratch.sums, ctx.lanes, rows, padded
+    )
     displace(ctx)
 
 
@@ -158,7 +167,7 @@ def through(ctx, projection, groups, table):
 def wide(ctx, table):
     """Stages from the values for any number of them."""
     chunks, lanes = ctx.chunks, ctx.lanes
-    multiply(table, chunks, chunks, ctx.values, lanes, ctx.sums, lanes, ctx.rows, ctx.padded)
+    multiply(table, chunks, chunks, ctx.values, lanes, ctx.scratch.sums, lanes, ctx.rows, ctx.padded)
     displace(ctx)
 
 
@@ -173,7 +182,7 @@ def product(ctx, table):
     elif route == WIDE:
         wide(ctx, table)
     else:
-        through(ctx, ctx.projection, ctx.groups, table)
+        through(ctx, ctx.tables.projection, ctx.tables.groups, table)
 
 
 @compiled
@@ -181,7 +190,7 @@ def sweep(ctx, count):
     """Iterate ``count`` times, without a test."""
     for _ in range(count):
         evaluate(ctx)
-        product(ctx, ctx.matrix)
+        product(ctx, ctx.tables.matrix)
 
 
 @compiled
@@ -190,23 +199,24 @@ def sweep_measured(ctx, before):
 
     It is relative to the size of its block; NaN if any stage is.
     """
-    ctx.tried += before + 1
+    solver = ctx.solver
+    solver.tried += before + 1
     if before > 0:
-        ctx.last = INFINITY  # the next change does not follow the last one that was measured
+        solver.last = INFINITY  # the next change does not follow the last one that was measured
     if ctx.fused:
         call_sweeps(ctx.fused, ctx, before + 1, MEASURE)
-        return ctx.change
+        return solver.change
     sweep(ctx, before)
     evaluate(ctx)
-    ctx.stages, ctx.old_stages = ctx.old_stages, ctx.stages
-    product(ctx, ctx.matrix)
-    return change(ctx, ctx.strict)
+    ctx.stages, ctx.scratch.old_stages = ctx.scratch.old_stages, ctx.stages
+    product(ctx, ctx.tables.matrix)
+    return change(ctx, ctx.blocks.weights)
 
 
 @compiled
 def sweep_to_the_end(ctx, count):
     """Iterate ``count`` times, and evaluate the field at the newest stages."""
-    ctx.tried += count + 1
+    ctx.solver.tried += count + 1
     if ctx.fused and count > 0:
         call_sweeps(ctx.fused, ctx, count, EVALUATE)
     else:

@@ -6,24 +6,21 @@ Where the fixed-point iteration allows much less than the errors do, the implici
 from math import log, log2
 
 from integrators.kernel.context import (
-    AT_STEP_END,
     BY_VALUES,
     DIVERGED,
     DONE,
-    END_ACROSS,
-    FIXED_POINT,
-    NO_SURFACE,
     NOT_KEPT,
-    NOTHING,
     RUNNING,
     SCATTERED,
     SLIDING,
-    START,
     UNDERFLOW,
     UNSCALED,
     UNSOLVED,
 )
 from integrators.kernel.native.jit import compiled
+from integrators.kernel.parts.implicit import FIXED_POINT
+from integrators.kernel.parts.kinks import NOTHING, START
+from integrators.kernel.parts.surfaces import AT_STEP_END, END_ACROSS, NO_SURFACE
 from integrators.kernel.simd.operations import binary_log, least
 from integrators.kernel.step.begin import FARTHEST, INFINITY, begin, on_table, set_step
 from integrators.kernel.step.control import (
@@ -92,8 +89,8 @@ STEADY = 1.2  # an implicit step that could be longer by less keeps its length, 
 def attempt(ctx, h):
     """Solve the step of length h from the state; return the outcome."""
     set_step(ctx, h)
-    if ctx.implicit:
-        ctx.rate = FIRST_RATE  # nobody knows what it will be afterwards
+    if ctx.implicit.active:
+        ctx.solver.rate = FIRST_RATE  # nobody knows what it will be afterwards
         outcome = solve_implicitly(ctx, ctx, 0)
     else:
         begin(ctx)
@@ -108,54 +105,56 @@ def iterate(ctx):
     The first change and the rate of contraction, as it was at the last step, tell how many
     iterations need no test; how many remain then, the rate of this step.
     """
+    solver = ctx.solver
     test(ctx, sweep_measured(ctx, 0))
-    tried = ctx.tried
-    if ctx.outcome != RUNNING or tried != 1:
+    tried = solver.tried
+    if solver.outcome != RUNNING or tried != 1:
         return settle(ctx)
-    first, known = binary_log(ctx.last), ctx.rate
+    first, known = binary_log(solver.last), solver.rate
     rate = known
     change, most = first, MOST * BUSY
-    trusted, log_trusted = ctx.trusted, ctx.log_trusted
-    while ctx.outcome == RUNNING:
+    trusted, log_trusted = solver.trusted, solver.log_trusted
+    while solver.outcome == RUNNING:
         untested = min(int((log_trusted - change) / rate) - 1, MOST_UNTESTED)
         strict = sweep_measured(ctx, max(untested, 0))
-        tries = ctx.tried - tried
+        tries = solver.tried - tried
         if strict > ROUNDING:
             change = binary_log(strict)
             rate = min(max((change - first) / tries, LEAST_RATE), MOST_RATE)
         elif strict == 0.0 and tries > 1:
             rate = max(rate + HOPE, LEAST_RATE)
-        ctx.rate = rate
+        solver.rate = rate
         test(ctx, strict)
-        if ctx.tried <= tried:  # started anew
+        if solver.tried <= tried:  # started anew
             return settle(ctx)
-        if ctx.outcome == RUNNING:
+        if solver.outcome == RUNNING:
             if strict <= trusted:
                 polish(ctx, strict)
-            elif tries >= TRIAL and tries + (ctx.log_rest - change) / rate > most:
-                ctx.outcome = DIVERGED  # not yet, but a shorter step is cheaper
-                ctx.rate = known
+            elif tries >= TRIAL and tries + (solver.log_rest - change) / rate > most:
+                solver.outcome = DIVERGED  # not yet, but a shorter step is cheaper
+                solver.rate = known
     return close(ctx)
 
 
 @compiled
 def aim(ctx, error, defect, grow):
     """Return the next step's length relative to this one's, from what is estimated for this one."""
+    controller = ctx.controller
     if not error < INFINITY:
         return SHRINK
-    h, behind = ctx.h, ctx.length_behind
+    h, behind = ctx.h, controller.length_behind
     known = behind != 0.0
-    error = log_of_order(error, error_power(ctx.error_degree))
+    error = log_of_order(error, error_power(controller.error_degree))
     defect = log_of_order(defect, defect_power(ctx.k))
-    ctx.error_ahead, ctx.defect_ahead = error, defect
+    controller.error_ahead, controller.defect_ahead = error, defect
     factor = as_errors_allow(
         error,
-        ctx.error_behind if known else INFINITY,
-        ctx.error_aim,
+        controller.error_behind if known else INFINITY,
+        controller.error_aim,
         defect,
-        ctx.defect_behind if known else INFINITY,
-        ctx.defect_aim,
-        ctx.allowed_defect < INFINITY,
+        controller.defect_behind if known else INFINITY,
+        controller.defect_aim,
+        controller.allowed_defect < INFINITY,
         log_ratio(h / behind) if known else 0.0,
     )
     return bounded(factor, grow)
@@ -171,38 +170,45 @@ def log_worth(ctx):
 @compiled
 def watch(ctx, factor):
     """Count the steps in a row that only the fixed-point iteration keeps from being much longer."""
+    controller = ctx.controller
     room = room_for_longer(
-        ctx.error_ahead, ctx.error_aim, ctx.defect_ahead, ctx.defect_aim, ctx.allowed_defect < INFINITY
+        controller.error_ahead,
+        controller.error_aim,
+        controller.defect_ahead,
+        controller.defect_aim,
+        controller.allowed_defect < INFINITY,
     )
     slow = 0
     if factor < HELD_BACK:
         much = room > LEAST_WORTH and room > log_worth(ctx)
         if not much and ctx.rows <= MOST_ROWS:
             decay = log_decay(ctx)
-            much = decay < 0.0 and log(ctx.error_decay) - decay > log_worth(ctx)
-        slow = ctx.slow + 1 if much else 0
-    ctx.slow = slow
+            much = decay < 0.0 and log(ctx.estimate.error_decay) - decay > log_worth(ctx)
+        slow = ctx.implicit.slow + 1 if much else 0
+    ctx.implicit.slow = slow
 
 
 @compiled
 def take_over(ctx):
     """Put the implicit solver to work."""
-    ctx.left = STAY
-    ctx.slow = 0
-    ctx.implicit = 1
-    ctx.switches += 1
-    ctx.length_limit = INFINITY
+    implicit = ctx.implicit
+    implicit.left = STAY
+    implicit.slow = 0
+    implicit.active = 1
+    ctx.counters.switches += 1
+    ctx.controller.length_limit = INFINITY
 
 
 @compiled
 def learn(ctx):
-    """Set `Context.held`, the steps to wait for the implicit solver, when that has given way again.
+    """Set `Implicit.held`, the steps to wait for the implicit solver, when that has given way again.
 
     If it did so as soon as it might, steps have not become longer.
     """
-    waited = max(ctx.held, HELD_BACK_STEPS)
-    gained = ctx.left < -1
-    ctx.held = HELD_BACK_STEPS if gained else min(2 * waited, MOST_HELD_BACK_STEPS)
+    implicit = ctx.implicit
+    waited = max(implicit.held, HELD_BACK_STEPS)
+    gained = implicit.left < -1
+    implicit.held = HELD_BACK_STEPS if gained else min(2 * waited, MOST_HELD_BACK_STEPS)
 
 
 @compiled
@@ -212,17 +218,18 @@ def remaining(ctx, t):
     Rounding is that of the times and of the step behind, which may be all there is at t = 0. A
     breakpoint counts as reached when it is so near that no step there could be told from none.
     """
+    controller = ctx.controller
     t0 = ctx.t0
     rest = (t - t0) - ctx.time_low
-    size = max(max(abs(t), abs(t0)), abs(ctx.length_behind))
-    close = SHORTEST if t == ctx.stop else CLOSE
-    return 0.0 if abs(rest) <= close * size or rest * ctx.next_length < 0.0 else rest
+    size = max(max(abs(t), abs(t0)), abs(controller.length_behind))
+    close = SHORTEST if t == controller.stop else CLOSE
+    return 0.0 if abs(rest) <= close * size or rest * controller.next_length < 0.0 else rest
 
 
 @compiled
 def within(ctx, h):
-    """Return the length of a step, no longer than `Context.longest` and not beyond `Context.stop`."""
-    longest, stop = ctx.longest, ctx.stop
+    """Return the length of a step, no longer than `Controller.longest` and not beyond `Controller.stop`."""
+    longest, stop = ctx.controller.longest, ctx.controller.stop
     if abs(h) > longest:
         h = longest if h > 0.0 else -longest
     if abs(stop) < INFINITY:
@@ -235,13 +242,14 @@ def within(ctx, h):
 @compiled
 def ready(ctx):
     """Solve the step ahead with a length that the tolerance allows; `Context.h` is its length."""
+    controller = ctx.controller
     if ctx.solved:
         return DONE
-    ctx.seen = ctx.acting = 0
-    if ctx.pace:
+    ctx.events.seen = ctx.events.acting = 0
+    if ctx.pace.code:
         return solve_at_pace(ctx)
-    if ctx.slow >= max(ctx.held, HELD_BACK_STEPS):
-        if ctx.solver == 0:
+    if ctx.implicit.slow >= max(ctx.implicit.held, HELD_BACK_STEPS):
+        if ctx.implicit.code == 0:
             return want_solver(ctx)
         take_over(ctx)
     begin_attempts(ctx)
@@ -249,29 +257,39 @@ def ready(ctx):
     while True:
         # Its first stages are on one side only if they are beyond the surface; what follows from the state
         # alone may be on either.
-        if ctx.on_surface and ctx.length == 0.0 and not leave(ctx) and ctx.locating + ctx.attempts == 0:
+        if (
+            ctx.surfaces.on_surface
+            and ctx.length == 0.0
+            and not leave(ctx)
+            and ctx.surfaces.locating + controller.attempts == 0
+        ):
             return SLIDING
-        h = within(ctx, ctx.next_length)
+        h = within(ctx, controller.next_length)
         too_short = not abs(h) > SHORTEST * abs(ctx.t0)
-        if (too_short or ctx.attempts > 0) and failure == UNDERFLOW and ctx.asks == 1 and ctx.rescaled == 0:
-            futile = too_short or ctx.attempts >= FUTILE or abs(h) < FUTILE_PART * ctx.interval
-            if futile or (ctx.attempts > 1 and ctx.longest < INFINITY and crawls(ctx, h)):
+        if (
+            (too_short or controller.attempts > 0)
+            and failure == UNDERFLOW
+            and ctx.estimate.asks == 1
+            and ctx.estimate.rescaled == 0
+        ):
+            futile = too_short or controller.attempts >= FUTILE or abs(h) < FUTILE_PART * controller.interval
+            if futile or (controller.attempts > 1 and controller.longest < INFINITY and crawls(ctx, h)):
                 ctx.length = 0.0
                 return UNSCALED
         if too_short:
             return failure
-        before = ctx.iterations
-        implicit = ctx.implicit
+        before = ctx.counters.iterations
+        implicit = ctx.implicit.active
         outcome = attempt(ctx, h)
-        if implicit and ctx.implicit == 0:
+        if implicit and ctx.implicit.active == 0:
             learn(ctx)
         ctx.solved = UNSOLVED
         if outcome == NOT_KEPT:
             return outcome
-        if accepts(ctx, outcome, ctx.iterations - before, implicit):
+        if accepts(ctx, outcome, ctx.counters.iterations - before, implicit):
             ctx.solved = BY_VALUES
             return DONE
-        if ctx.undone:
+        if ctx.kinks.undone:
             undo(ctx)
             begin_attempts(ctx)
         failure = UNDERFLOW if outcome == DONE else outcome
@@ -280,9 +298,9 @@ def ready(ctx):
 @compiled
 def solve_at_pace(ctx):
     """Solve the step ahead, whose length nothing but the density of the steps determines."""
-    if not abs(ctx.next_length) > SHORTEST * abs(ctx.t0):
+    if not abs(ctx.controller.next_length) > SHORTEST * abs(ctx.t0):
         return UNDERFLOW
-    outcome = attempt(ctx, ctx.next_length)
+    outcome = attempt(ctx, ctx.controller.next_length)
     ctx.solved = BY_VALUES if outcome == DONE else UNSOLVED
     return outcome
 
@@ -291,30 +309,34 @@ def solve_at_pace(ctx):
 def crawls(ctx, h):
     """Whether steps are so short after many that the field's rounding may be what cuts them."""
     return (
-        abs(h) < CRAWL * ctx.interval and ctx.steps >= CRAWL_STEPS and ctx.steps % CRAWL_STEPS < CRAWL_LOOKS
+        abs(h) < CRAWL * ctx.controller.interval
+        and ctx.counters.steps >= CRAWL_STEPS
+        and ctx.counters.steps % CRAWL_STEPS < CRAWL_LOOKS
     )
 
 
 @compiled
 def begin_attempts(ctx):
     """Begin to look for the length of the step ahead."""
-    ctx.rejected = ctx.attempts = ctx.doubts = ctx.locating = ctx.landing = 0
+    ctx.controller.rejected = ctx.controller.attempts = ctx.kinks.doubts = 0
+    ctx.surfaces.locating = ctx.surfaces.reached = 0
 
 
 @compiled
 def accepts(ctx, outcome, iterations, implicit):
     """Whether the attempted step of length `Context.h` is good enough.
 
-    If it is, `Context.length_after` is the length of the step after it; else `Context.next_length` is that
-    of the next attempt.
+    If it is, `Controller.length_after` is the length of the step after it; else `Controller.next_length`
+    is that of the next attempt.
     """
+    controller, surfaces = ctx.controller, ctx.surfaces
     error, defect = estimate_attempt(ctx, outcome, implicit)
-    factor = aim(ctx, error, defect, GROW if ctx.attempts == 0 else 1.0)
-    if outcome == DONE and ctx.blind and abs(ctx.h) > ctx.longest_blind:
-        reject(ctx, outcome, ctx.longest_blind / abs(ctx.h), implicit)
+    factor = aim(ctx, error, defect, GROW if controller.attempts == 0 else 1.0)
+    if outcome == DONE and ctx.estimate.blind and abs(ctx.h) > controller.longest_blind:
+        reject(ctx, outcome, controller.longest_blind / abs(ctx.h), implicit)
         return False
-    good = is_good(error, ctx.allowed_error, defect, ctx.allowed_defect)
-    if ctx.sides and (ctx.locating or (ctx.across != NO_SURFACE and not good)):
+    good = is_good(error, controller.allowed_error, defect, controller.allowed_defect)
+    if surfaces.code and (surfaces.locating or (surfaces.across != NO_SURFACE and not good)):
         found = locate(ctx, outcome, good)
         if found == AGAIN:
             again(ctx, outcome, implicit)
@@ -322,8 +344,8 @@ def accepts(ctx, outcome, iterations, implicit):
         if found == LANDED:
             land_on_surface(ctx, factor, iterations, implicit)
             return True
-        ctx.locating = 0
-        if ctx.across != NO_SURFACE:
+        surfaces.locating = 0
+        if surfaces.across != NO_SURFACE:
             count(ctx, ctx.t0, ctx.h)
             good = False
     if not good:
@@ -336,25 +358,26 @@ def accepts(ctx, outcome, iterations, implicit):
 @compiled
 def estimate_attempt(ctx, outcome, implicit):
     """Return the estimated errors of the attempted step; infinite: it failed, or has a kink that matters."""
-    ctx.undone = 0
-    across = look_across(ctx, outcome) if ctx.sides else NO_SURFACE
+    kinks, surfaces = ctx.kinks, ctx.surfaces
+    kinks.undone = 0
+    across = look_across(ctx, outcome) if surfaces.code else NO_SURFACE
     if outcome != DONE:
         return INFINITY, INFINITY
-    ctx.crossed = 1 if across >= 0 or (across == END_ACROSS and ctx.locating == 0) else 0
+    surfaces.crossed = 1 if across >= 0 or (across == END_ACROSS and surfaces.locating == 0) else 0
     error, defect = estimate_implicit(ctx) if implicit else estimate(ctx)
-    fits = is_good(error, ctx.allowed_error, defect, ctx.allowed_defect)
+    fits = is_good(error, ctx.controller.allowed_error, defect, ctx.controller.allowed_defect)
     if implicit:
-        if ctx.crossed and (ctx.kinked or fits) and kink(ctx, fits):
+        if surfaces.crossed and (kinks.kinked or fits) and kink(ctx, fits):
             error = INFINITY
-        ctx.border_ahead = NOTHING
-        ctx.undone = 0
+        kinks.border_ahead = NOTHING
+        kinks.undone = 0
     else:
-        if ctx.kinked:
-            ctx.doubts += 1
-            ctx.doubt_end = ctx.t0 + ctx.h
-        if (fits or ctx.doubts >= SURE) and kink(ctx, fits):
+        if kinks.kinked:
+            kinks.doubts += 1
+            kinks.doubt_end = ctx.t0 + ctx.h
+        if (fits or kinks.doubts >= SURE) and kink(ctx, fits):
             error = INFINITY
-    if ctx.surfaces and fits and error < INFINITY and across == NO_SURFACE and grazes(ctx):
+    if surfaces.count and fits and error < INFINITY and across == NO_SURFACE and grazes(ctx):
         count(ctx, ctx.t0, ctx.h)
         error = INFINITY
     return error, defect
@@ -374,33 +397,34 @@ def follow(ctx, factor, iterations, implicit):
     implicit : int
         Whether the implicit solver made it.
     """
+    controller = ctx.controller
     h = ctx.h
-    if ctx.rescaled:
-        ctx.rescaled = SCALE_LASTS if ctx.borrowed else ctx.rescaled - 1
-    if ctx.doubts >= SURE and ctx.kinks:
-        ctx.length_limit = INFINITY  # what the iteration allowed was for the kink
-    ctx.length_limit = ctx.length_limit * APPROACH
-    busy = ctx.busy_implicit if implicit else BUSY
-    factor = as_iterations_allow(factor, busy, iterations, abs(h), ctx.length_limit)
+    if ctx.estimate.rescaled:
+        ctx.estimate.rescaled = SCALE_LASTS if ctx.estimate.borrowed else ctx.estimate.rescaled - 1
+    if ctx.kinks.doubts >= SURE and ctx.kinks.count:
+        controller.length_limit = INFINITY  # what the iteration allowed was for the kink
+    controller.length_limit = controller.length_limit * APPROACH
+    busy = ctx.implicit.busy if implicit else BUSY
+    factor = as_iterations_allow(factor, busy, iterations, abs(h), controller.length_limit)
     if implicit and 1.0 < factor < STEADY:
         factor = 1.0
-    elif implicit == 0 and ctx.strategy != FIXED_POINT:
+    elif implicit == 0 and ctx.implicit.strategy != FIXED_POINT:
         watch(ctx, factor)
     length = h * (factor if implicit else on_table(ctx, factor))
-    if ctx.blind and abs(length) > ctx.longest_blind:
-        length = ctx.longest_blind if h > 0.0 else -ctx.longest_blind
-    ctx.length_after = length
+    if ctx.estimate.blind and abs(length) > controller.longest_blind:
+        length = controller.longest_blind if h > 0.0 else -controller.longest_blind
+    controller.length_after = length
 
 
 @compiled
 def again(ctx, outcome, implicit):
     """Forget the attempted step, whose next attempt is to end on a switching surface."""
     if implicit:
-        ctx.implicit_steps -= 1
-    ctx.rejections += 1
+        ctx.counters.implicit_steps -= 1
+    ctx.counters.rejections += 1
     ctx.length = 0.0
-    if outcome == DONE and ctx.across < 0:
-        ctx.length, ctx.rejected = ctx.h, 1
+    if outcome == DONE and ctx.surfaces.across < 0:
+        ctx.length, ctx.controller.rejected = ctx.h, 1
 
 
 @compiled
@@ -408,59 +432,62 @@ def land_on_surface(ctx, factor, iterations, implicit):
     """Let the attempted step, which ends on a switching surface, be followed by one as long as was wanted."""
     count(ctx, ctx.t0 + ctx.h, 0.0)
     follow(ctx, factor, iterations, implicit)
-    ctx.landing = 1
-    wanted = ctx.length_wanted
-    if abs(wanted) > abs(ctx.length_after):
-        ctx.length_after = wanted
+    ctx.surfaces.reached = 1
+    wanted = ctx.surfaces.length_wanted
+    if abs(wanted) > abs(ctx.controller.length_after):
+        ctx.controller.length_after = wanted
 
 
 @compiled
 def reject(ctx, outcome, factor, implicit):
     """Set the length of the next attempt, this one's times a factor at most."""
+    controller = ctx.controller
     h = ctx.h
     if implicit:
-        ctx.implicit_steps -= 1
+        ctx.counters.implicit_steps -= 1
     if outcome == DONE:
         ctx.length = h
-        ctx.rejected = 1
+        controller.rejected = 1
     else:
         ctx.length = 0.0
-        ctx.length_limit = RETREAT * abs(h)
+        controller.length_limit = RETREAT * abs(h)
         if outcome in (DIVERGED, SCATTERED):
             factor = RETREAT
-    ctx.next_length = h * least(factor, SAFETY)
-    ctx.rejections += 1
-    ctx.attempts += 1
+    controller.next_length = h * least(factor, SAFETY)
+    ctx.counters.rejections += 1
+    controller.attempts += 1
 
 
 @compiled
 def take(ctx):
     """Take the step ahead, which is solved."""
+    controller, behind = ctx.controller, ctx.behind
     t, low = time_after(ctx.t0, ctx.time_low, ctx.h)
     keep_end(ctx)
-    ctx.behind_state, ctx.state, ctx.next_state = ctx.state, ctx.next_state, ctx.behind_state
-    ctx.behind_error, ctx.error, ctx.next_error = ctx.error, ctx.next_error, ctx.behind_error
+    behind.state, ctx.state, ctx.next_state = ctx.state, ctx.next_state, behind.state
+    behind.error, ctx.error, ctx.next_error = ctx.error, ctx.next_error, behind.error
     count_step(ctx)
-    ctx.n = ctx.restful = 0
-    if ctx.asks < 0:
-        ctx.asks = ctx.asks + 1 if ctx.asks < -1 else 1
+    ctx.n = controller.restful = 0
+    if ctx.estimate.asks < 0:
+        ctx.estimate.asks = ctx.estimate.asks + 1 if ctx.estimate.asks < -1 else 1
     ctx.t0 = t
     ctx.time_low = low
-    ctx.next_length = ctx.length_after
-    ctx.length_behind = ctx.h
-    ctx.error_behind = ctx.error_ahead
-    ctx.defect_behind = ctx.defect_ahead
-    if ctx.pace:
+    controller.next_length = controller.length_after
+    controller.length_behind = ctx.h
+    controller.error_behind = controller.error_ahead
+    controller.defect_behind = controller.defect_ahead
+    if ctx.pace.code:
         keep_pace(ctx)
-    if ctx.sides:
+    if ctx.surfaces.code:
         arrive_on_surface(ctx)
 
 
 @compiled
 def arrive_on_surface(ctx):
     """Begin anew where the step behind has ended on a switching surface."""
-    ctx.on_surface = AT_STEP_END if ctx.landing else 0
-    if ctx.landing:
-        ctx.landing = 0
-        ctx.length = ctx.length_behind = 0.0
-        ctx.border = START
+    surfaces = ctx.surfaces
+    surfaces.on_surface = AT_STEP_END if surfaces.reached else 0
+    if surfaces.reached:
+        surfaces.reached = 0
+        ctx.length = ctx.controller.length_behind = 0.0
+        ctx.kinks.border = START

@@ -18,8 +18,6 @@ from integrators.kernel.context import (
     BUDGET,
     BY_INCREMENT,
     DONE,
-    FIXED_POINT,
-    FOR_VECTORS,
     LANDING,
     PART_END,
     STATE,
@@ -29,6 +27,7 @@ from integrators.kernel.context import (
 )
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
+from integrators.kernel.parts.implicit import FIXED_POINT, FOR_VECTORS
 from integrators.kernel.simd.memory import get, put, spread
 from integrators.kernel.simd.views import doubles
 from integrators.kernel.step.begin import choose, predict, prepare, rewind, set_factors, set_step
@@ -59,7 +58,7 @@ def show_stages(ctx, vectors):
         for d in range(ctx.rows):
             stage = get(ctx.stages, source + lanes * d)
             put(vectors.stages, target + lanes * d, stage)
-            put(vectors.old_stages, target + lanes * d, stage)
+            put(vectors.scratch.old_stages, target + lanes * d, stage)
 
 
 @compiled
@@ -71,7 +70,7 @@ def pull_stages(ctx, vectors, pulls):
         for d in range(vectors.rows):
             moved = get(ctx.stages, source + lanes * (d % rows)) - spread(ctx.state, position(ctx, d % rows))
             i = target + lanes * d
-            put(vectors.base, i, get(vectors.base, i) + pulls[d] * moved)
+            put(vectors.scratch.base, i, get(vectors.scratch.base, i) + pulls[d] * moved)
 
 
 @compiled
@@ -108,12 +107,13 @@ def differentiate(ctx, trajectory, vectors, earlier, part, pulls):
     pulls : int
         Address of relative derivatives of velocities, or 0.
     """
+    solver = vectors.solver
     vectors.t0, vectors.time_low, vectors.n = ctx.t0, ctx.time_low, ctx.n
     if vectors.h != ctx.h:
         set_factors(vectors, ctx.h)
     if ctx.varying:
         set_step(ctx, ctx.h)
-    vectors.matrix = ctx.matrix
+    vectors.tables.matrix = ctx.tables.matrix
     show_stages(ctx, vectors)
     if ctx.solved == BY_INCREMENT:
         if part:
@@ -130,19 +130,19 @@ def differentiate(ctx, trajectory, vectors, earlier, part, pulls):
         take_sizes(vectors)
     else:
         choose(vectors)
-    test(vectors, sweep_measured(vectors, vectors.free if vectors.predicted else 0))
+    test(vectors, sweep_measured(vectors, solver.free if solver.predicted else 0))
     outcome = settle(vectors)
     if outcome == DONE:
         outcome = finish(vectors)
         if outcome == DONE and pulls != 0:
             pull_end(ctx, vectors, doubles(pulls))
         return outcome
-    if trajectory.strategy == FIXED_POINT or pulls != 0:
+    if trajectory.implicit.strategy == FIXED_POINT or pulls != 0:
         return outcome
-    if vectors.solver == 0:
-        trajectory.wanted = FOR_VECTORS
+    if vectors.implicit.code == 0:
+        trajectory.implicit.wanted = FOR_VECTORS
         return BUDGET
-    vectors.predicted = 0
+    solver.predicted = 0
     return finish_implicitly(vectors, part)
 
 

@@ -1,6 +1,7 @@
 """Tangent vectors of one trajectory, as Python sees them."""
 
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -104,13 +105,17 @@ class Vectors:
         if (n, moves) not in self._fresh:
             self._fresh[n, moves] = self._made(system, base, n, moves)
         made = self._fresh[n, moves].copy()
-        made.point(base.tables)
-        made.tolerance, made.log_rest, made.varying = base.tolerance, base.log_rest, base.varying
-        made.rate = FIRST_RATE
+        made.point_to(base.used_tables)
+        made.solver.tolerance, made.solver.log_rest, made.varying = (
+            base.solver.tolerance,
+            base.solver.log_rest,
+            base.varying,
+        )
+        made.solver.rate = FIRST_RATE
         parameters = [base.par, *chosen.parameters.T] if moves else [base.par]
         made.par[:] = np.concatenate(parameters)
         if shape.second:
-            made.velocity[: n * shape.rows] = np.tile(base.velocity[: shape.rows], n)
+            made.factors.velocity[: n * shape.rows] = np.tile(base.factors.velocity[: shape.rows], n)
         made.write(_laid_out(chosen.state, shape.rows))
         return made
 
@@ -126,7 +131,7 @@ class Vectors:
             system.n_par * (1 + n if moves else 1), block, np.arange(halves * n), c,
         )  # fmt: skip
         padded = -(-rows // 8) * 8 + -(-shape.rows // 8) * 8
-        return Context(wider, base.tables, {"padded": padded})
+        return Context(wider, base.used_tables, {"padded": padded})
 
     def _pulls(self, system: System, chosen: Directions) -> Array | None:
         """Return the derivatives of the velocities relative to these, by row; ``None`` where they are 0."""
@@ -138,7 +143,7 @@ class Vectors:
         par = np.concatenate([self._context.par, *chosen.parameters.T])
         slopes = emit.numpy(system, along)(0.0, np.zeros(0), par)
         pulls = aligned(slopes.size)
-        pulls[:] = slopes / np.tile(self._context.velocity[: shape.rows], n)
+        pulls[:] = slopes / np.tile(self._context.factors.velocity[: shape.rows], n)
         return pulls if pulls.any() else None
 
     def solve_by(self, solvers: tuple[Workspace, Workspace]) -> None:
@@ -147,17 +152,17 @@ class Vectors:
         for pair, pulls in zip(self._pairs, self._memory.pulls.tolist(), strict=True):
             for context, solver in zip(pair, solvers, strict=True):
                 workspace = solver.along(context.shape, context.padded, pulls)
-                context.solver, context.solver_memory = (
+                context.implicit.code, context.implicit.memory = (
                     implicit_engine.solver.code().address,
                     workspace.address,
                 )
-                context.point({"increment": workspace.increment})
+                context.point({"implicit.increment": workspace.increment})
                 self.solvers.append(workspace)
 
     @property
     def iterations(self) -> int:
         """Iterations of all groups, own and partial steps."""
-        return sum(context.iterations for pair in self._pairs for context in pair)
+        return sum(context.counters.iterations for pair in self._pairs for context in pair)
 
     @property
     def failed(self) -> bool:
@@ -182,7 +187,7 @@ class Vectors:
             own.write(_laid_out(state[:, first : first + n], rows))
             own.error[:] = 0.0
             own.length = own.older_length = 0.0
-            own.age = 0
+            own.blocks.age = 0
             first += n
 
     def scale(self, factors: Array) -> None:
@@ -205,8 +210,7 @@ class Vectors:
     def save(self) -> tuple[Any, ...]:
         """Return copies of all that the continuation depends on."""
         groups = tuple(
-            (own.words[_LASTING], tuple(getattr(own, name).copy() for name in _ARRAYS))
-            for own, _ in self._pairs
+            (own.words[_LASTING], tuple(array.copy() for array in _arrays(own))) for own, _ in self._pairs
         )
         solvers = tuple(solver.save() for solver in self.solvers)
         ahead = [array.copy() for array in self._step_ahead]
@@ -226,8 +230,8 @@ class Vectors:
         for (own, _), (words, arrays) in zip(self._pairs, groups, strict=True):
             own.words[_LASTING] = words
             own.set_factors(own.h)
-            for name, kept in zip(_ARRAYS, arrays, strict=True):
-                getattr(own, name)[:] = kept
+            for array, kept in zip(_arrays(own), arrays, strict=True):
+                array[:] = kept
         for solver, kept in zip(self.solvers, solvers, strict=bool(solvers)):
             solver.restore(kept)
 
@@ -253,10 +257,20 @@ class Vectors:
 
 # What goes from step to step.
 _LASTING = [
-    Context.slots[name].place
-    for name in ("h", "t0", "time_low", "n", "length", "older_length", "age", "free", "rate")
+    Context.word_of[name]
+    for name in (
+        "h",
+        "t0",
+        "time_low",
+        "n",
+        "length",
+        "older_length",
+        "blocks.age",
+        "solver.free",
+        "solver.rate",
+    )
 ]
-_ARRAYS = "state", "error", "values", "older_values", "strict", "floored"
+_arrays = attrgetter("state", "error", "values", "older_values", "blocks.weights", "blocks.floored_weights")
 
 
 def _laid_out(vectors: Array, rows: int) -> Array:

@@ -56,7 +56,7 @@ def test_a_step_is_solved_with_the_last_change_still_visible_and_its_effect_remo
     changes = []
     for n in range(1, 40):
         stepper.advance([0.2 * n])
-        changes.append(stepper._context.last)
+        changes.append(stepper._context.solver.last)
     assert max(changes) > 1e-16  # measured 6.8e-14: without the prediction it would have gone on
     energy = problem.errors(stepper.y[None])["energy"].max()
     assert energy < 5e-15  # measured 1.2e-15

@@ -35,7 +35,7 @@ def test_increments_are_right_to_a_part_of_their_last_bit(system, k, s, most):
     stepper = HBVMProgram(system, k=k, s=s, h=H).start(start)
     stepper.advance([STEPS * H])
     context = stepper._context
-    assert context.steps == STEPS
+    assert context.counters.steps == STEPS
     errors = []
     for i, slope in enumerate(SLOPES):
         place, first = (8 * (i // 4) + i % 4, start[24 + i]) if system is FALLING else (i, start[i])

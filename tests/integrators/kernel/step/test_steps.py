@@ -178,7 +178,7 @@ def test_two_steps_give_eight_stages_a_better_start():
     problem = problems.load("outer_solar_system")
     stepper = HBVMProgram(problem.system, k=8, s=8, h=1.0).start(problem.y0)
     stepper.advance([1000.0])
-    iterations, steps = stepper._context.iterations, stepper._context.steps
+    iterations, steps = stepper._context.counters.iterations, stepper._context.counters.steps
     assert iterations < 6.3 * steps  # measured 5.9, from one step 6.7
 
 

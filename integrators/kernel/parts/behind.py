@@ -1,0 +1,13 @@
+"""Where the last step began."""
+
+from integrators.kernel.native.memory import Array, Integer, Part, Real
+
+
+class Behind(Part):
+    """The state before the step behind, to go back to; see `step.kinks.undo`."""
+
+    state = Array(2, "padded")
+    error = Array(2, "padded")
+    t0 = Real()
+    time_low = Real()
+    on_surface = Integer()  # `Surfaces.on_surface` there

@@ -1,0 +1,29 @@
+"""The lengths of adaptive steps."""
+
+from integrators.kernel.native.memory import Integer, Part, Real
+
+
+class Controller(Part):
+    """The lengths of adaptive steps, and what they follow from; see `step.vary` and `step.control`."""
+
+    allowed_error = Real()  # the estimated local error of a step, relative, at most
+    allowed_defect = Real()  # the same of the quadrature; infinite: any
+    error_degree = Integer()  # of the Legendre coefficient that the error is estimated by
+    error_aim = Real()  # logarithm of the error to aim at, divided by its order
+    defect_aim = Real()
+    error_behind = Real()  # logarithm of the last step's estimated error, divided by its order ...
+    error_ahead = Real()  # ... and of that of the step that is solved
+    defect_behind = Real()  # the same for the defect
+    defect_ahead = Real()
+    length_behind = Real()  # of the last step; 0: unknown
+    next_length = Real()  # of the next step to be tried
+    length_after = Real()  # of the one after the step that is solved
+    length_limit = Real()  # no step is longer, for what the iteration allows
+    longest = Real()  # no step is longer, for what the user allows and the interval
+    longest_blind = Real()  # the same where the field has the same value at all nodes of a step
+    interval = Real()  # length of all that is integrated, from the trajectory's start; 0: unknown
+    stop = Real()  # no step passes this time; infinite: none
+    breaks = Integer()  # 1: `stop` is a time at which the field may jump
+    attempts = Integer()  # at the step ahead that were rejected
+    rejected = Integer()  # 1: `Context.values` are of a rejected step of `length`, from the present state
+    restful = Integer()  # 1: the field at the start tells no time scale

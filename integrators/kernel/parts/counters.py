@@ -1,0 +1,16 @@
+"""What a trajectory has cost."""
+
+from integrators.kernel.native.memory import Integer, Part
+
+
+class Counters(Part):
+    """Counters of a trajectory, which `integrators.protocol.Stats` reports."""
+
+    steps = Integer()
+    iterations = Integer()
+    evaluations = Integer()
+    restarts = Integer()
+    partial_steps = Integer()
+    implicit_steps = Integer()
+    switches = Integer()
+    rejections = Integer()

@@ -1,0 +1,18 @@
+"""The projection onto the energy."""
+
+from integrators.kernel.native.memory import Array, Integer, Part, Real
+
+
+class Energy(Part):
+    """The energy that steps end with; see `step.projection`."""
+
+    # address of what writes the gradient of the energy and then the energy itself, called like the field with
+    # eight stages; 0: no projection
+    code = Integer()
+    start = Real()  # the energy of the start, which steps end with,
+    scale = Real()  # and the inverse of how much of it the components make there
+    rows = Integer()  # of what it writes: one more than the state has; 0: no projection
+    width = Integer()  # components of a block of the state
+    places = Array(of=int)  # where the components of (q, p) or y are in the state
+    state = Array("rows", 8)
+    found = Array("rows", 8)

@@ -1,0 +1,33 @@
+"""What the error of a step is estimated by."""
+
+from integrators.kernel.native.memory import Array, Integer, Part, Real
+
+# Legendre coefficients of the field that a step is judged by: gamma_0 .. gamma_3, that before and that of
+# `Controller.error_degree`, the last two that k nodes see, two from the middle. Then the field at a step's
+# ends.
+GAMMA_0, GAMMA_1, GAMMA_2, GAMMA_3, BEFORE_ERROR, AT_ERROR, BEFORE_LAST, LAST = range(8)
+MIDDLE, AFTER_MIDDLE, AT_START, AT_END = range(8, 12)
+
+
+class Estimate(Part):
+    """The estimated errors of a step, block by block; see `step.estimate`."""
+
+    estimators = Array()  # b_l P_j(c_l), a row for each of GAMMA_0 .. AT_END
+    coefficients = Array(8, "rows")  # GAMMA_0 .. LAST of the field, row by row
+    scale = Array("blocks.count")  # of blocks: their size in the step that is estimated,
+    slope = Array("blocks.count")  # the largest coefficient of their field,
+    gamma_error = Array("blocks.count")  # gamma_s, which the error is estimated by,
+    gamma_last = Array("blocks.count")  # gamma_{k-1}, which the defect is estimated by,
+    abrupt = Array("blocks.count")  # and the largest that does not fall off as a smooth field's do
+    fastest = Array("blocks.count")  # scale in each group, as a velocity,
+    steepest = Array("blocks.count")  # and slope
+    least_slope = Real()  # of a block's field beside the largest in its group, where errors are estimated
+    error_decay = Real()  # of coefficients from one degree to the next, where the error is allowed
+    defect_decay = Real()  # the same where the defect is
+    absolute = Array("blocks.count")  # the absolute tolerance of blocks, divided by the relative one
+    expected = Array("blocks.count")  # the largest size that blocks will reach, as far as is known
+    rescaled = Integer()  # > 0: errors are relative to that where it is larger than a block's own size
+    borrowed = Integer()  # 1: by their own sizes alone the step that was estimated is not good enough
+    # 1: what blocks will reach can be asked for, by UNSCALED; -n: after n steps again; 0: never
+    asks = Integer()
+    blind = Integer()  # 1: the field has the same value at all nodes of the step that was estimated

@@ -1,0 +1,22 @@
+"""The implicit solver, and when it takes over from the fixed-point iteration."""
+
+from integrators.kernel.native.memory import Array, Integer, Part, Real
+
+# Which nonlinear solver is used. AUTO: fixed point, and the implicit solver where that does not contract.
+FIXED_POINT, AUTO, ALWAYS_IMPLICIT = range(3)
+NOT_WANTED, FOR_STEPS, FOR_VECTORS = range(3)
+
+
+class Implicit(Part):
+    """The implicit solver beside the fixed-point iteration; see `step.handover`."""
+
+    strategy = Integer()  # FIXED_POINT, AUTO, ALWAYS_IMPLICIT
+    code = Integer()  # address of int64(context, memory, started); 0: not there yet
+    memory = Integer()
+    active = Integer()  # 1: it is at work
+    wanted = Integer()  # it should be, and is not there: FOR_STEPS, or only FOR_VECTORS that follow
+    slow = Integer()  # steps in a row at which the fixed-point iteration was slow
+    held = Integer()  # steps for which the implicit solver stays at work when it takes over
+    left = Integer()  # steps of these that are left
+    busy = Real()  # corrections of an adaptive step to aim at, at most
+    increment = Array()  # what it has found that the step adds to q, p or to y

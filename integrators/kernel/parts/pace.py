@@ -1,0 +1,19 @@
+"""Reversible steps."""
+
+from integrators.kernel.native.memory import Array, Integer, Part, Real
+
+
+class Pace(Part):
+    """Reversible steps, of length `epsilon` / density; see `step.reversible`."""
+
+    code = Integer()  # address of `problems.emit.time_scale`, called like the field; 0: no such steps
+    rows = Integer()
+    parameters = Integer()
+    par = Array("parameters")
+    state = Array("rows", "lanes")
+    values = Array(2, "lanes")
+    times = Array("lanes")
+    epsilon = Real()  # negative backwards
+    log_density = Real()  # of the step ahead
+    log_density_behind = Real()
+    density_slope = Real()  # of the logarithm, in time, at the state
