@@ -25,6 +25,7 @@ from integrators.kernel.native import field as fields
 from integrators.kernel.native.foreign import field_of
 from integrators.kernel.native.memory import aligned
 from integrators.kernel.parts.implicit import ALWAYS_IMPLICIT
+from integrators.kernel.spare import Pair, Spare
 from integrators.kernel.step import fused
 from integrators.kernel.step.engine import steps
 from integrators.kernel.step.rule import (
@@ -161,6 +162,7 @@ class HBVMProgram(Compiled):
         )  # fmt: skip
         self._fixed = tables.fixed(self.constants)
         self._fresh: dict[bool, Context] = {}
+        self.spare = Spare()
         self.vectors: dict[tuple[int, bool], Context] = {}
         """Contexts of tangent vectors, by their number and whether they move parameters, to be copied."""
         parts = [self.field, kernel, self.fused, *(self.kept.code if self.kept else ())]
@@ -324,7 +326,7 @@ class HBVMProgram(Compiled):
 
     def contexts(self) -> tuple[Context, Context]:
         """Return fresh memory for a trajectory, and for its partial steps."""
-        own, side = self._context(side=False), self._context(side=True)
+        own, side = self._context(side=False).copy(), self._context(side=True).copy()
         if self.kept:
             self.kept.share(own, side)
         return own, side
@@ -333,7 +335,22 @@ class HBVMProgram(Compiled):
         if side not in self._fresh:
             # when it is complete: another thread may copy it at once
             self._fresh[side] = self._made(side=side)
-        return self._fresh[side].copy()
+        return self._fresh[side]
+
+    def pair(self, par: Array) -> Pair:
+        """Return memory for a trajectory with these parameters, fresh or that of one that is over."""
+        pair = self.spare.take()
+        if pair is None:
+            pair = Pair(*self.contexts())
+            self._put(pair.own, pair.side, par)
+        elif not pair.renew(key := par.tobytes()):
+            pair.own.become(self._context(side=False))
+            pair.side.become(self._context(side=True))
+            if self.kept:
+                self.kept.share(pair.own, pair.side)
+            self._put(pair.own, pair.side, par)
+            pair.keep(key)
+        return pair
 
     def _made(self, *, side: bool) -> Context:
         tables = {**self._fixed, **({} if side else self.scaled(self.h))}
@@ -343,21 +360,24 @@ class HBVMProgram(Compiled):
         made.solver.log_rest = LOG_REST
         return made
 
-    def load(self, contexts: tuple[Context, Context], y: Array, par: Array, t0: float) -> None:
-        """Put parameters, and what follows from them and from the start (t0, y), into a pair of contexts."""
-        for context in contexts:
+    def _put(self, own: Context, side: Context, par: Array) -> None:
+        """Put parameters, and what follows from them, into fresh memory."""
+        for context in (own, side):
             context.par[:] = par
         if self.second:
             velocity, speed, mass = self._velocity(par)
-            for context in contexts:
+            for context in (own, side):
                 (
                     context.factors.velocity[: self.shape.rows],
                     context.blocks.speed[:],
                     context.blocks.mass[:],
                 ) = velocity, speed, mass
-        contexts[0].h = self.h
+        own.h, own.implicit.strategy = self.h, self.solver.strategy
+
+    def begin(self, pair: Pair, y: Array, par: Array, t0: float) -> None:
+        """Put what a trajectory from (t0, y) begins with besides into its memory."""
         if self.kept:
-            self.kept.load(contexts, y, par, t0)
+            self.kept.load((pair.own, pair.side), y, par, t0)
 
     def _velocity_scale(self, par: Array) -> Array:
         """Q' = velocity * p, of unit momenta; shape (dof,), empty in first-order form."""
@@ -532,11 +552,15 @@ class AdaptiveProgram(HBVMProgram):
             f"max_steps={self.max_steps!r}, atol={self.atol!r}{kept}{projected})"
         )
 
-    def load(self, contexts: tuple[Context, Context], y: Array, par: Array, t0: float) -> None:
-        """Put what a trajectory from (t0, y) begins with into a pair of contexts."""
-        super().load(contexts, y, par, t0)
-        contexts[0].controller.next_length = self.first or 0.0
-        contexts[0].kinks.doubt_end = t0
+    def _put(self, own: Context, side: Context, par: Array) -> None:
+        """Put parameters, and what follows from them, into fresh memory."""
+        super()._put(own, side, par)
+        own.controller.next_length = self.first or 0.0
+
+    def begin(self, pair: Pair, y: Array, par: Array, t0: float) -> None:
+        """Put what a trajectory from (t0, y) begins with besides into its memory."""
+        super().begin(pair, y, par, t0)
+        pair.own.kinks.doubt_end = t0
 
     def _made(self, *, side: bool) -> Context:
         context = super()._made(side=True)  # with a matrix of its own
@@ -608,10 +632,10 @@ class ReversibleProgram(AdaptiveProgram):
         context.solver.log_rest = LOG_REST
         return context
 
-    def load(self, contexts: tuple[Context, Context], y: Array, par: Array, t0: float) -> None:
-        """Put what a trajectory from (t0, y) begins with into a pair of contexts."""
-        super().load(contexts, y, par, t0)
-        context = contexts[0]
+    def begin(self, pair: Pair, y: Array, par: Array, t0: float) -> None:
+        """Put what a trajectory from (t0, y) begins with besides into its memory."""
+        super().begin(pair, y, par, t0)
+        context = pair.own
         context.pace.code = self._pace.address
         ahead = self._ordinary.start(y, par, t0).take(SCOUTED)
         states = np.concatenate([y[np.newaxis], ahead.y]).T

@@ -34,6 +34,7 @@ from integrators.kernel.native import binary, engine
 from integrators.kernel.native.memory import address
 from integrators.kernel.pace import FEWEST, Pace
 from integrators.kernel.parts.implicit import ALWAYS_IMPLICIT, AUTO, FOR_VECTORS, NOT_WANTED
+from integrators.kernel.spare import Pair, Spare
 from integrators.kernel.step.engine import steps
 from integrators.kernel.tables import Constants
 from integrators.kernel.tangent.vectors import Directions, Vectors
@@ -75,8 +76,10 @@ class Program(Protocol):
 
     vectors: dict[tuple[int, bool], Context]
 
-    def contexts(self) -> tuple[Context, Context]: ...
-    def load(self, contexts: tuple[Context, Context], y: Array, par: Array, t0: float) -> None: ...
+    spare: Spare
+
+    def pair(self, par: Array) -> Pair: ...
+    def begin(self, pair: Pair, y: Array, par: Array, t0: float) -> None: ...
     def scaled(self, h: float) -> dict[str, Array]: ...
     def implicit(self) -> Workspace: ...
 
@@ -157,9 +160,9 @@ class HBVMStepper(ABC):
         self._implicit: tuple[Workspace, Workspace] | None = None
         self._dim, self._pace = y.size, Pace(CHUNK, y.size)
         self._status, self._reason = Status.RUNNING, ""
-        self._context, self._side = program.contexts()
-        program.load((self._context, self._side), y, par, t0)
-        self._context.implicit.strategy = program.solver.strategy
+        self._pair: Pair | None = program.pair(par)
+        self._context, self._side = self._pair.own, self._pair.side
+        program.begin(self._pair, y, par, t0)
         if program.solver.strategy == ALWAYS_IMPLICIT:
             self._take_implicit()
         self._begin(y, t0)
@@ -247,6 +250,14 @@ class HBVMStepper(ABC):
         for workspace in self._implicit or ():
             workspace.forget()
         steps(engine.RESET, ctx.address, 0, 0, 0, 0, 0, 0, 0, address(y), 0)
+
+    @one_thread
+    def release(self) -> None:
+        """Leave its memory to the next trajectory; see `integrators.protocol.Reusable`."""
+        pair, self._pair = self._pair, None
+        if pair is not None and self.search is None and self._vectors is None and not self._recorded:
+            del self._context, self._side
+            self._program.spare.give(pair)
 
     @property
     def t(self) -> float:

@@ -24,6 +24,7 @@ from integrators.protocol import (
     KeptError,
     MethodBase,
     Program,
+    Reusable,
     Samples,
     Samplings,
     Status,
@@ -273,7 +274,10 @@ def integrate(
         method=method,
         error=error,
     )
-    return _with_events(solution, stepper.search) if wanted else solution
+    solution = _with_events(solution, stepper.search) if wanted else solution
+    if offers(stepper, Reusable):
+        stepper.release()
+    return solution
 
 
 def _lost(problem: Problem, method: MethodBase, samples: Samples, steps: int) -> Losses:

@@ -32,6 +32,8 @@ from numpy.typing import NDArray
 Numbers = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
+Content = tuple[Numbers, dict[int, NDArray[Any]]]
+
 LINE = 8  # words in 64 bytes, at a multiple of which every array begins
 
 
@@ -295,18 +297,41 @@ class Memory(_Slots):
         self.numbers = self._structure.from_buffer(memory)
         self.address = ctypes.addressof(self.numbers)
 
+    @property
+    def nbytes(self) -> int:
+        """How many bytes it has, arrays included."""
+        return self._memory.nbytes
+
     def copy(self) -> Self:
         """Return memory of its own with the same content, which points to the same arrays."""
         other = object.__new__(type(self))
         vars(other).update(vars(self))
         for part in self.part_of:  # which are this one's
             vars(other).pop(part, None)
-        other._pointed = self._pointed.copy()
-        memory = _from_a_line_on(np.empty(self._memory.size + LINE))
-        memory[:] = self._memory
-        other._lies_in(memory)
-        other.words[self._places] += other.address - self.address
+        other._pointed = {}
+        other._lies_in(_from_a_line_on(np.empty(self._memory.size + LINE)))
+        other.become(self)
         return other
+
+    def become(self, other: Self) -> None:
+        """Take the content of another of the same shape, and point to the same arrays."""
+        self._memory[:] = other._memory
+        self._own, self._places = other._own, other._places
+        self.words[self._places] += self.address - other.address
+        self._point_as(other._pointed)
+
+    def content(self) -> "Content":
+        """Return a copy of all that it holds, for `renew`."""
+        return self._memory.copy(), self._pointed.copy()
+
+    def renew(self, content: "Content") -> None:
+        """Take back what `content` returned."""
+        self._memory[:], pointed = content
+        self._point_as(pointed)
+
+    def _point_as(self, pointed: Mapping[int, NDArray[Any]]) -> None:
+        self._pointed.clear()
+        self._pointed.update(pointed)
 
     def point(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Let slots point to arrays, and keep these alive."""

@@ -1,0 +1,58 @@
+"""The memory of trajectories that are over, for the next ones of the same program."""
+
+from integrators.kernel.context import Context
+from integrators.kernel.native.memory import Content
+
+PAIRS = 4
+"""That are spare at most: more trajectories at a time have memory of their own."""
+
+BYTES = 1 << 18
+"""In a context that is spare, at most: beside the steps of such a system a fresh one costs little."""
+
+
+class Pair:
+    """The memory of a trajectory, and of its partial steps.
+
+    Parameters
+    ----------
+    own, side : Context
+        Fresh ones.
+    """
+
+    par = b""
+    """The parameters of `_content`; they say nothing while there is none."""
+    _content: tuple[Content, Content] | None = None
+
+    def __init__(self, own: Context, side: Context):
+        self.own, self.side = own, side
+
+    def keep(self, par: bytes) -> None:
+        """Take what both hold for what a trajectory with these parameters begins with."""
+        self.par, self._content = par, (self.own.content(), self.side.content())
+
+    def renew(self, par: bytes) -> bool:
+        """Let both hold what a trajectory with these parameters begins with; False if that is not known."""
+        if self._content is None or self.par != par:
+            return False
+        self.own.renew(self._content[0])
+        self.side.renew(self._content[1])
+        return True
+
+
+class Spare:
+    """Pairs that no trajectory has; threads may share it."""
+
+    def __init__(self) -> None:
+        self._pairs: list[Pair] = []
+
+    def take(self) -> Pair | None:
+        """Return a pair that is nobody else's."""
+        try:
+            return self._pairs.pop()
+        except IndexError:
+            return None
+
+    def give(self, pair: Pair) -> None:
+        """Take the pair of a trajectory that is over."""
+        if pair.own.nbytes <= BYTES and len(self._pairs) < PAIRS:
+            self._pairs.append(pair)

@@ -1,0 +1,136 @@
+"""The memory of trajectories that are over serves others, which have the bits of their own."""
+
+import threading
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import problems
+from integrators import HBVM, Gauss, LineIntegral, integrate
+from integrators.kernel import spare
+from integrators.running.integrate import prepared as made_before
+
+KEPLER = problems.load("kepler")
+STIFF = problems.Problem(
+    problems.VectorField(lambda y: [y[1], 500.0 * (1 - y[0] ** 2) * y[1] - y[0]], dim=2),
+    y0=[2.0, 0.0],
+    t_end=1.0,
+)
+SPRING = problems.Hamiltonian(
+    lambda q, p, par: p[0] ** 2 / (2 * par.mass) + par.k * q[0] ** 4,
+    dof=1,
+    parameters={"k": 1.0, "mass": 1.0},
+)
+
+
+def prepared(method, system) -> Any:
+    return made_before(method, system)[0]
+
+
+METHODS = [
+    HBVM(),
+    HBVM(tol=1e-6),
+    HBVM(tol=1e-6, projection="energy"),
+    HBVM(k=8, s=4, h=0.05),
+    Gauss(s=4, h=0.05, solver="newton"),
+    Gauss(s=4, tol=1e-8, steps="reversible"),
+    LineIntegral(k=8, s=4, h=0.05, invariants=["energy"]),
+]
+
+
+def spring(k, mass, start, end):
+    return problems.Problem(SPRING, q0=[start], p0=[0.3], parameters={"k": k, "mass": mass}, t_end=end)
+
+
+def bits(solution):
+    return solution.y.tobytes(), solution.t.tobytes(), solution.stats, solution.status, solution.reason
+
+
+SPRINGS = st.builds(
+    spring,
+    st.sampled_from([0.5, 2.0]),
+    st.sampled_from([1.0, 3.0]),
+    st.floats(0.5, 2.0),
+    st.sampled_from([-2.0, 0.01, 3.0]),
+)
+
+
+@pytest.mark.parametrize("method", METHODS, ids=repr)
+@settings(max_examples=8)
+@given(
+    others=st.lists(SPRINGS, min_size=1, max_size=3),
+    last=SPRINGS,
+    sample=st.sampled_from(["steps", "stop", None]),
+)
+def test_what_was_integrated_before_leaves_no_trace(method, others, last, sample):
+    made = prepared(method, SPRING)
+    made.spare = spare.Spare()
+    alone = bits(integrate(last, method, sample=sample))
+    for other in others:
+        integrate(other, method, sample=sample)
+    assert bits(integrate(last, method, sample=sample)) == alone
+
+
+def test_the_memory_is_the_same_one():
+    made = prepared(HBVM(), KEPLER.system)
+    integrate(KEPLER, HBVM(), 1.0)
+    first, second = (made.start(KEPLER.y0, KEPLER.par) for _ in range(2))
+    place = first._context.address
+    first.release()
+    first.release()  # once is enough
+    third, fourth = (made.start(KEPLER.y0, KEPLER.par) for _ in range(2))
+    assert third._context.address == place
+    assert len({place, second._context.address, fourth._context.address}) == 3
+
+
+def test_an_implicit_solver_that_came_later_is_not_handed_on():
+    first = integrate(STIFF, HBVM())
+    assert first.stats.extra["implicit"]["switches"] > 0
+    again = integrate(STIFF, HBVM())
+    assert bits(again) == bits(first)
+
+
+def test_neither_large_memory_nor_much_is_kept(monkeypatch):
+    made = prepared(HBVM(), KEPLER.system)
+    made.spare = spare.Spare()
+    steppers = [made.start(KEPLER.y0, KEPLER.par) for _ in range(spare.PAIRS + 2)]
+    size = steppers[0]._context.nbytes
+    monkeypatch.setattr(spare, "BYTES", size - 1)
+    steppers.pop().release()
+    assert made.spare.take() is None
+    monkeypatch.setattr(spare, "BYTES", size)
+    for stepper in steppers:
+        stepper.release()
+    assert len([pair for _ in steppers if (pair := made.spare.take())]) == spare.PAIRS
+
+
+def test_two_threads_have_memory_of_their_own():
+    expected = [integrate(KEPLER, HBVM(), end).y.tobytes() for end in (20.0, 30.0)]
+    wrong = []
+
+    def run(end, alone):
+        for _ in range(30):
+            if integrate(KEPLER, HBVM(), end).y.tobytes() != alone:
+                wrong.append(end)
+
+    threads = [threading.Thread(target=run, args=each) for each in zip((20.0, 30.0), expected, strict=True)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not wrong
+
+
+def test_samples_and_events_of_one_are_not_those_of_the_next():
+    def crosses(t, y):
+        return y[1]
+
+    first = integrate(KEPLER, HBVM(), [1.0, 20.0], events=crosses)
+    kept = first.y.copy(), first.events["crosses"].y.copy()
+    integrate(KEPLER, HBVM(), [2.0, 30.0], events=crosses)
+    integrate(KEPLER, HBVM(), [2.0, 30.0])
+    assert np.array_equal(first.y, kept[0])
+    assert np.array_equal(first.events["crosses"].y, kept[1])
