@@ -50,7 +50,7 @@ def test_memory_is_there_for_other_threads_only_when_it_is_complete():
 
     class Watched(dict):
         def __setitem__(self, key, value):
-            seen.append(value.tolerance)
+            seen.append(value.solver.tolerance)
             super().__setitem__(key, value)
 
     made._fresh = Watched()
