@@ -1,0 +1,1 @@
+"""Random Hamiltonians: how often an integrator reports success and is wrong."""

@@ -1,0 +1,273 @@
+"""The page on random Hamiltonians, from kept results alone."""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from statistics import median
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from hbvm_bench.report.document import Items, Maker, Note, Section
+from hbvm_bench.report.figures.style import INK, MUTED
+from hbvm_bench.report.page import Results as Run
+from hbvm_bench.report.page import block
+from hbvm_bench.store.store import Store
+from hbvm_bench.studies.computations import (
+    Part,
+    Results,
+    Task,
+    load,
+    run_all,
+    sections_of,
+    telling,
+)
+from hbvm_bench.studies.drawn import WIDTH, Said, drawn
+from hbvm_bench.studies.random_hamiltonians.systems import COUNT, DRAWS, FAMILIES, SEED, family_of
+from hbvm_bench.studies.random_hamiltonians.trials import (
+    CRASHED,
+    LIMIT,
+    METHODS,
+    NO_ANSWER,
+    REFUSED,
+    SLOW_DRAWS,
+    TOLERANCE,
+    Outcome,
+    Trial,
+    outcomes,
+)
+from hbvm_bench.summaries.rows import seconds as in_words
+from hbvm_bench.summaries.table import NONE, Table
+
+NAME = "random"
+AT_ONCE = 2 * DRAWS  # problems of one process
+QUICK = (0, 52)  # problems of a quick run, and its methods
+QUICK_METHODS = ("HBVM()", "Taylor(tol=1e-10)", "DOP853(rtol=1e-10, atol=1e-06)")
+FACTORS = (10.0, 100.0, 1000.0)
+Judge = Callable[[Outcome, Trial], float]
+
+
+def parts(*, quick: bool) -> list[Part]:
+    """Return what is computed and shown, in a quick run or a whole one."""
+    pieces = [QUICK] if quick else [range(i, i + AT_ONCE) for i in range(0, COUNT, AT_ONCE)]
+    methods = QUICK_METHODS if quick else METHODS
+    tasks = [Task(f"of {i}", partial(outcomes, list(piece), methods)) for i, piece in enumerate(pieces)]
+
+    def blocks(found: Results) -> list[Maker]:
+        made = [one for i in range(len(pieces)) for one in found[f"of {i}"]]
+        return [
+            ("how often", lambda: wrong(made, position, "position", POSITION)),
+            ("the picture", lambda: picture(made)),
+            ("the energy", lambda: wrong(made, energy, "energy", ENERGY)),
+            ("the endings", lambda: endings(made)),
+            ("the families", lambda: families(made)),
+            ("what is left out", lambda: left_out(made)),
+            ("how", lambda: Note(HOW)),
+        ]
+
+    return [Part("trials", "Errors behind a success", tasks, lambda found: [], blocks)]
+
+
+def compute(store: Store, jobs: int, tell: Callable[[str], None]) -> None:
+    """Compute what is missing beside the cases of a run."""
+    quick = store.index().campaign.quick
+    tasks = [task for part in parts(quick=quick) for task in part.tasks]
+    run_all(NAME, tasks, jobs, store, telling(tell, len(tasks)), variant="quick" * quick)
+
+
+COMPUTATIONS = {"compute": compute}
+
+
+@block
+def trials(run: Run) -> list[Section]:
+    """Return what came out."""
+    kept = load(NAME, run.beside)
+    quick = run.runs[-1].index.campaign.quick
+    return sections_of([(part, Results(part, kept)) for part in parts(quick=quick)])
+
+
+def position(outcome: Outcome, trial: Trial) -> float:
+    """Return the error of the position over the condition number and the tolerance; NaN if not judged."""
+    return trial.position / (TOLERANCE * max(1.0, outcome.condition)) if outcome.judged else np.nan
+
+
+def energy(outcome: Outcome, trial: Trial) -> float:
+    """Return the change of the energy over its scale and the tolerance; NaN where it is not conserved."""
+    del outcome
+    return trial.energy / TOLERANCE
+
+
+def counted(made: Sequence[Outcome], method: str, judge: Judge) -> tuple[int, list[float]]:
+    """Return how many problems a method was judged on, and the factors of those that it says it solved.
+
+    A failure that was reported, and a process that had to be ended, counts as judged and is not wrong.
+    """
+    asked = [
+        (one, trial)
+        for one in made
+        for trial in one.trials
+        if trial.method == method and trial.status != REFUSED and one.end
+    ]
+    known = [(one, judge(one, trial), trial.success) for one, trial in asked]
+    factors = [factor for _, factor, success in known if success and not np.isnan(factor)]
+    failed = sum(not success and _judges(one, judge) for one, _, success in known)
+    return len(factors) + failed, factors
+
+
+def _judges(outcome: Outcome, judge: Judge) -> bool:
+    """Whether any integrator that arrived has a factor here."""
+    return any(not np.isnan(judge(outcome, trial)) for trial in outcome.trials if trial.success)
+
+
+def share(count: int, total: int) -> str:
+    """Return a share with its 95 % interval (Wilson): ``"3 of 200: 1.5 % [0.5, 4.3]"``."""
+    if not total:
+        return NONE
+    from scipy.stats import binomtest  # what draws a page may load it
+
+    low, high = binomtest(count, total).proportion_ci(method="wilson")
+    return f"{count} of {total}: {count / total:.1%} [{100 * low:.1f}, {100 * high:.1f}]"
+
+
+def wrong(made: Sequence[Outcome], judge: Judge, what: str, note: str) -> Table:
+    """Return how often each method reports success beyond each of the factors."""
+    rows = []
+    for method in METHODS:
+        total, factors = counted(made, method, judge)
+        rows.append(
+            (
+                method,
+                *(share(sum(one > factor for one in factors), total) for factor in FACTORS),
+                f"{median(factors):.1g}" if factors else NONE,
+                f"{max(factors):.1g}" if factors else NONE,
+            )
+        )
+    heads = tuple(f"> {factor:g} times" for factor in FACTORS)
+    return Table(
+        f"Success reported, {what} wrong",
+        ("method", *heads, "median", "largest"),
+        rows,
+        note,
+        key=f"random-{what}",
+    )
+
+
+@drawn("random-factors", "Errors behind a success", WIDTH, 5.0)
+def picture(figure: Figure, made: Sequence[Outcome]) -> Said:
+    """Draw the share of problems by the factor that their error exceeds."""
+    axes = figure.subplots()
+    said = []
+    dashes = ("-", (0, (5, 2)), (0, (1, 1.5)))
+    for i, method in enumerate(METHODS):
+        total, factors = counted(made, method, position)
+        if not factors:
+            continue
+        x = np.sort(np.maximum(factors, 1e-8))
+        y = np.arange(len(x), 0, -1) / total
+        axes.step(x, y, where="post", label=method, color=f"C{i % 10}", linestyle=dashes[i // 10], lw=1.3)
+        said.append(f"{method}: {sum(one > FACTORS[0] for one in factors)} of {total}")
+    for factor in FACTORS:
+        axes.axvline(factor, color=MUTED, linewidth=0.8, linestyle=(0, (4, 3)))
+    axes.axvline(1.0, color=INK, linewidth=0.9)
+    axes.set(
+        xscale="log",
+        xlabel="position error / (tolerance × condition number)",
+        ylabel="share of problems beyond",
+        ylim=(0, 1),
+    )
+    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), fontsize="small")
+    return (
+        "Share of the problems in which the method reports success and the error of the position at the end "
+        "is larger than so many times the tolerance times the condition number.",
+        f"Beyond {FACTORS[0]:g} times: " + "; ".join(said) + ".",
+    )
+
+
+def endings(made: Sequence[Outcome]) -> Table:
+    """Return how the integrations ended, and their times."""
+    rows = []
+    solved = [one for one in made if one.end]
+    for method in METHODS:
+        found = [trial for one in solved for trial in one.trials if trial.method == method]
+        ran = [trial for trial in found if trial.status != REFUSED]
+        other = [trial for trial in ran if not trial.success]
+        hung = sum(trial.status in (NO_ANSWER, CRASHED) for trial in other)
+        times = [trial.seconds for trial in ran if trial.success]
+        rows.append(
+            (
+                method,
+                f"{len(ran)}",
+                f"{len(found) - len(ran)}" if len(found) > len(ran) else NONE,
+                share(len(other) - hung, len(ran)),
+                f"{hung}" if hung else NONE,
+                in_words(median(times)) if times else NONE,
+                in_words(max(times)) if times else NONE,
+                f"{median([trial.steps for trial in ran if trial.success]):.0f}" if times else NONE,
+            )
+        )
+    return Table(
+        "Failures reported, and times",
+        ("method", "problems", "refused", "failure reported", "no answer", "median time", "longest", "steps"),
+        rows,
+        f"Of problems with a reference. No answer: the process crashed or was ended after {LIMIT:g} s. "
+        "Times: CPU seconds of one run without compiling, through `integrate`, beside a second process of "
+        "the same kind: orders of magnitude. Steps: the median.",
+        key="random-endings",
+    )
+
+
+def families(made: Sequence[Outcome]) -> Table:
+    """Return by family how many positions are wrong."""
+    factor = FACTORS[1]
+    rows = []
+    for method in METHODS:
+        cells = []
+        for family in FAMILIES:
+            total, factors = counted(
+                [one for one in made if family_of(one.number) == family], method, position
+            )
+            cells.append(f"{sum(one > factor for one in factors)} of {total}" if total else NONE)
+        rows.append((method, *cells))
+    return Table(
+        f"Success reported, position wrong by more than {factor:g} times, by family",
+        ("method", *FAMILIES),
+        rows,
+        "Problems of each family.",
+        key="random-families",
+    )
+
+
+def left_out(made: Sequence[Outcome]) -> Items:
+    """Return which problems are not judged, and what was reported on those without a reference."""
+    said = []
+    for one in made:
+        arrived = [trial.method for trial in one.trials if trial.success]
+        name = f"problem {one.number} ({family_of(one.number)})"
+        if not one.end:
+            who = ", ".join(arrived) or "by none"
+            said.append(f"{name} has no reference: {one.why.rstrip('.')}. Success reported: {who}.")
+        elif not one.judged:
+            said.append(f"{name}: condition number {one.condition:.1e}; positions are not judged.")
+    return Items(said or ["All problems are judged."])
+
+
+POSITION = (
+    f"Error of the positions at the end over their distance from the origin, over {TOLERANCE:g} times the "
+    "condition number of that end. In brackets: 95 % interval in per cent (Wilson). Median and largest: of "
+    "this quotient. Local errors add up over the steps, so that a factor of 10 alone may be within what a "
+    "method promises; a factor of 1000 is not."
+)
+ENERGY = (
+    f"Change of the energy from start to end, where it is conserved, over {TOLERANCE:g} times its scale: the "
+    "sum of |∂H/∂y y| over the components, so that a constant added to H changes nothing."
+)
+HOW = (
+    f"{COUNT} problems of {len(FAMILIES)} families, drawn from the seed {SEED}: "
+    "`hbvm_bench.studies.random_hamiltonians.systems.problem(number)` returns each. Five problems in a row "
+    "have one formula and their own coefficients, start and interval; the intervals of shares take all as "
+    f"independent. Every method is asked for {TOLERANCE:g}; `HBVM()`, `Taylor()` and `IAS15` choose their "
+    "accuracy themselves and are judged by the same. `atol=1e-06` is SciPy's default. Radau, which takes "
+    f"seconds, has {SLOW_DRAWS} of the {DRAWS} problems of each formula. References: two computations in "
+    "113-bit and double-double arithmetic that agree to 1e-16. Condition number: how far the end moves when "
+    "the state at the worst time is changed by a small part of itself (`hbvm_bench.reference.condition`). "
+    "Where it is above 1e7, positions are not judged."
+)
