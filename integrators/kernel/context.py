@@ -51,7 +51,7 @@ RUNNING, DONE, DIVERGED, NOT_FINITE, BUDGET, UNDERFLOW, SCATTERED, NOT_KEPT, HAL
 UNSCALED, UNSEEN, SLIDING, ACTS, ACCUMULATE = range(9, 14)
 
 # How states between steps are made.
-SIDE, LAND, DENSE = range(3)
+PARTIAL, STOP, DENSE = range(3)
 
 # What solves the step ahead, if anything does: the values, or increments that the implicit solver has found.
 UNSOLVED, BY_VALUES, BY_INCREMENT = range(3)
@@ -63,8 +63,8 @@ MEASURE, EVALUATE = 1, 2
 VALUES, END, ARRIVE = range(3)
 
 # What vectors follow; see `Context.follow`: a solved STEP, a sample at the present STATE, or at the end of a
-# solved PART, and the present state's LANDING there.
-STEP, STATE, PART_END, LANDING = range(4)
+# solved PART, and the present state, which has STOPPED there.
+STEP, STATE, PART_END, STOPPED = range(4)
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from integrators.kernel.context import DENSE, DONE, LAND, SIDE
+from integrators.kernel.context import DENSE, DONE, PARTIAL, STOP
 from integrators.kernel.native import engine
 from integrators.kernel.stepper import HBVMStepper
 from integrators.protocol import Array, Samples, Status
@@ -33,15 +33,16 @@ class FixedStepper(HBVMStepper):
             self._set_step(self._program.h)
         self._begin(start, t0)
         self._status, self._reason, self.error = Status.RUNNING, "", None
-        return self._make(LAND, np.array([t]), np.zeros(1, dtype=np.int64), np.array([t - t0]))
+        return self._make(STOP, np.array([t]), np.zeros(1, dtype=np.int64), np.array([t - t0]))
 
     def _one(self) -> bool:
         (numbers, _, place, out), ctx = self._room, self._context
         target = numbers.view(np.int64)[:1]
         target[0] = ctx.n + 1
         # its time and the part of a step beyond it are of no account: 0.0
+        own, partial = ctx.address, self._partial.address
         outcome = self._enter(
-            engine.ADVANCE, ctx.address, self._side.address, SIDE, 1, place + 8, place, place + 8, 0, out, 1
+            engine.ADVANCE, own, partial, PARTIAL, 1, place + 8, place, place + 8, 0, out, 1
         )
         return self._is_one(outcome, DONE)
 
@@ -51,7 +52,7 @@ class FixedStepper(HBVMStepper):
         ctx = self._context
         targets = ctx.n + np.arange(1, count + 1)
         times = np.asarray(ctx.t0 + targets * ctx.h, dtype=np.float64)
-        return self._make(SIDE, times, targets, np.zeros(count))
+        return self._make(PARTIAL, times, targets, np.zeros(count))
 
     @one_thread
     def march(self, end: float, most: int) -> Samples:
@@ -68,7 +69,7 @@ class FixedStepper(HBVMStepper):
         turn = (grid[-1] - self.t) * h < 0.0
         if turn:  # steps are counted from here
             t0, n, h = self.t, 0, -h
-        between = {"stop": LAND, "dense": DENSE}.get(sample, SIDE)
+        between = {"stop": STOP, "dense": DENSE}.get(sample, PARTIAL)
         bases = np.full(grid.size, t0)
         if sample == "stop":
             bases[1:] = grid[:-1]

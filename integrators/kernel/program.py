@@ -326,47 +326,47 @@ class HBVMProgram(Compiled):
 
     def contexts(self) -> tuple[Context, Context]:
         """Return fresh memory for a trajectory, and for its partial steps."""
-        own, side = self._context(side=False).copy(), self._context(side=True).copy()
+        own, partial = self._context(partial=False).copy(), self._context(partial=True).copy()
         if self.kept:
-            self.kept.share(own, side)
-        return own, side
+            self.kept.share(own, partial)
+        return own, partial
 
-    def _context(self, *, side: bool) -> Context:
-        if side not in self._fresh:
+    def _context(self, *, partial: bool) -> Context:
+        if partial not in self._fresh:
             # when it is complete: another thread may copy it at once
-            self._fresh[side] = self._made(side=side)
-        return self._fresh[side]
+            self._fresh[partial] = self._made(partial=partial)
+        return self._fresh[partial]
 
     def pair(self, par: Array) -> Pair:
         """Return memory for a trajectory with these parameters, fresh or that of one that is over."""
         pair = self.spare.take()
         if pair is None:
             pair = Pair(*self.contexts())
-            self._put(pair.own, pair.side, par)
+            self._put(pair.own, pair.partial, par)
         elif not pair.renew(key := par.tobytes()):
-            pair.own.become(self._context(side=False))
-            pair.side.become(self._context(side=True))
+            pair.own.become(self._context(partial=False))
+            pair.partial.become(self._context(partial=True))
             if self.kept:
-                self.kept.share(pair.own, pair.side)
-            self._put(pair.own, pair.side, par)
+                self.kept.share(pair.own, pair.partial)
+            self._put(pair.own, pair.partial, par)
             pair.keep(key)
         return pair
 
-    def _made(self, *, side: bool) -> Context:
-        tables = {**self._fixed, **({} if side else self.scaled(self.h))}
+    def _made(self, *, partial: bool) -> Context:
+        tables = {**self._fixed, **({} if partial else self.scaled(self.h))}
         more = {"energy.rows": self.system.dim + 1} if self.projected else self._more
         made = self.kept.context(self.shape, tables) if self.kept else Context(self.shape, tables, more)
         made.solver.tolerance = TOLERANCE
         made.solver.log_rest = LOG_REST
         return made
 
-    def _put(self, own: Context, side: Context, par: Array) -> None:
+    def _put(self, own: Context, partial: Context, par: Array) -> None:
         """Put parameters, and what follows from them, into fresh memory."""
-        for context in (own, side):
+        for context in (own, partial):
             context.par[:] = par
         if self.second:
             velocity, speed, mass = self._velocity(par)
-            for context in (own, side):
+            for context in (own, partial):
                 (
                     context.factors.velocity[: self.shape.rows],
                     context.blocks.speed[:],
@@ -377,7 +377,7 @@ class HBVMProgram(Compiled):
     def begin(self, pair: Pair, y: Array, par: Array, t0: float) -> None:
         """Put what a trajectory from (t0, y) begins with besides into its memory."""
         if self.kept:
-            self.kept.load((pair.own, pair.side), y, par, t0)
+            self.kept.load((pair.own, pair.partial), y, par, t0)
 
     def _velocity_scale(self, par: Array) -> Array:
         """Q' = velocity * p, of unit momenta; shape (dof,), empty in first-order form."""
@@ -462,7 +462,7 @@ class AdaptiveProgram(HBVMProgram):
         c = self.constants
         if c.route != tables.THROUGH:
             self._fixed["raw_matrix"] = tables.rounded(c)
-        self._onward = tables.onward(c) if c.route > tables.THROUGH else aligned(0)
+        self._extrapolations = tables.extrapolations(c) if c.route > tables.THROUGH else aligned(0)
         self.degree = tables.degree_of_error(k, s)
         basis = legendre(c.arrays["nodes"].reshape(-1), k) * c.arrays["weights"].reshape(-1)[:, None]
         middle = max(1, (k - 4) // 2)
@@ -552,9 +552,9 @@ class AdaptiveProgram(HBVMProgram):
             f"max_steps={self.max_steps!r}, atol={self.atol!r}{kept}{projected})"
         )
 
-    def _put(self, own: Context, side: Context, par: Array) -> None:
+    def _put(self, own: Context, partial: Context, par: Array) -> None:
         """Put parameters, and what follows from them, into fresh memory."""
-        super()._put(own, side, par)
+        super()._put(own, partial, par)
         own.controller.next_length = self.first or 0.0
 
     def begin(self, pair: Pair, y: Array, par: Array, t0: float) -> None:
@@ -562,8 +562,8 @@ class AdaptiveProgram(HBVMProgram):
         super().begin(pair, y, par, t0)
         pair.own.kinks.doubt_end = t0
 
-    def _made(self, *, side: bool) -> Context:
-        context = super()._made(side=True)  # with a matrix of its own
+    def _made(self, *, partial: bool) -> Context:
+        context = super()._made(partial=True)  # with a matrix of its own
         context.solver.log_rest = LOG_REST_VARYING
         if self._energy:
             context.energy.code = self._energy.address
@@ -573,7 +573,7 @@ class AdaptiveProgram(HBVMProgram):
             context.solver.log_rest = max(math.log2(context.solver.tolerance), LOG_REST_VARYING)
         context.solver.trusted = min(TRUSTED * context.solver.tolerance, MOST_TRUSTED)
         context.solver.log_trusted = math.log2(UNTESTED * context.solver.tolerance)
-        context.point({"estimate.estimators": self._estimators, "tables.extrapolation": self._onward})
+        context.point({"estimate.estimators": self._estimators, "tables.extrapolation": self._extrapolations})
         context.varying = 1
         context.controller.error_degree = self.degree
         context.controller.allowed_error = self.tol
@@ -627,8 +627,8 @@ class ReversibleProgram(AdaptiveProgram):
         """The method with all that steps depend on, as text."""
         return f"Gauss(s={self.constants.s}, tol={self.tol!r}, steps='reversible')"
 
-    def _made(self, *, side: bool) -> Context:
-        context = super()._made(side=side)
+    def _made(self, *, partial: bool) -> Context:
+        context = super()._made(partial=partial)
         context.solver.log_rest = LOG_REST
         return context
 

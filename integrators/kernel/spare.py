@@ -15,7 +15,7 @@ class Pair:
 
     Parameters
     ----------
-    own, side : Context
+    own, partial : Context
         Fresh ones.
     """
 
@@ -23,19 +23,19 @@ class Pair:
     """The parameters of `_content`; they say nothing while there is none."""
     _content: tuple[Content, Content] | None = None
 
-    def __init__(self, own: Context, side: Context):
-        self.own, self.side = own, side
+    def __init__(self, own: Context, partial: Context):
+        self.own, self.partial = own, partial
 
     def keep(self, par: bytes) -> None:
         """Take what both hold for what a trajectory with these parameters begins with."""
-        self.par, self._content = par, (self.own.content(), self.side.content())
+        self.par, self._content = par, (self.own.content(), self.partial.content())
 
     def renew(self, par: bytes) -> bool:
         """Let both hold what a trajectory with these parameters begins with; False if that is not known."""
         if self._content is None or self.par != par:
             return False
         self.own.renew(self._content[0])
-        self.side.renew(self._content[1])
+        self.partial.renew(self._content[1])
         return True
 
 

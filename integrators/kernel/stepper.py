@@ -161,7 +161,7 @@ class HBVMStepper(ABC):
         self._dim, self._pace = y.size, Pace(CHUNK, y.size)
         self._status, self._reason = Status.RUNNING, ""
         self._pair: Pair | None = program.pair(par)
-        self._context, self._side = self._pair.own, self._pair.side
+        self._context, self._partial = self._pair.own, self._pair.partial
         program.begin(self._pair, y, par, t0)
         if program.solver.strategy == ALWAYS_IMPLICIT:
             self._take_implicit()
@@ -172,7 +172,7 @@ class HBVMStepper(ABC):
         end: float,
     ) -> None:  # fmt: skip
         """Look for events in all steps from here on, up to a time."""
-        contexts, code = (self._context, self._side), steps.code().address
+        contexts, code = (self._context, self._partial), steps.code().address
         self.search = KernelSearch(events, functions, actions, contexts, code, end)
         self._pace = Pace(CHUNK_WITH_EVENTS, self._dim)
         self._pace.steps = FEWEST
@@ -186,7 +186,7 @@ class HBVMStepper(ABC):
         if self._vectors and self._vectors.fits(directions):
             self._vectors.put(directions.state)
         else:
-            self._vectors = Vectors(system, (self._context, self._side), directions, program.vectors)
+            self._vectors = Vectors(system, (self._context, self._partial), directions, program.vectors)
             if self._implicit is not None:
                 self._vectors.solve_by(self._implicit)
         program.compile_seconds += binary.clock() - started
@@ -256,7 +256,7 @@ class HBVMStepper(ABC):
         """Leave its memory to the next trajectory; see `integrators.protocol.Reusable`."""
         pair, self._pair = self._pair, None
         if pair is not None and self.search is None and self._vectors is None and not self._recorded:
-            del self._context, self._side
+            del self._context, self._partial
             self._program.spare.give(pair)
 
     @property
@@ -351,7 +351,7 @@ class HBVMStepper(ABC):
         """Return the implicit solver's memory for own and for partial steps; compile it if need be."""
         if self._implicit is None:
             self._implicit = (self._program.implicit(), self._program.implicit())
-            for context, workspace in zip((self._context, self._side), self._implicit, strict=True):
+            for context, workspace in zip((self._context, self._partial), self._implicit, strict=True):
                 context.implicit.code = solver_engine.solver.code().address
                 context.implicit.memory = workspace.address
                 context.implicit.busy = workspace.busy
@@ -534,7 +534,7 @@ class HBVMStepper(ABC):
             self._take_implicit()
         with self._pace:
             outcome = self._enter(
-                what, self._context.address, self._side.address, between, times.size,
+                what, self._context.address, self._partial.address, between, times.size,
                 address(times), targets, parts, made, address(out), budget,
             )  # fmt: skip
         return self._handled(outcome)
@@ -590,7 +590,7 @@ class HBVMStepper(ABC):
                 f"events that change the state accumulate at t = {self.t!r}: the times between them become "
                 "too short to be told from none, or the state stays where the event happens."
             )
-        return failure(outcome, self._program, (self._context, self._side), self.t, self._solver)
+        return failure(outcome, self._program, (self._context, self._partial), self.t, self._solver)
 
 
 def failure(

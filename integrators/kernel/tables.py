@@ -268,7 +268,7 @@ def rounded(constants: Constants) -> Array:
 
 
 @lru_cache(maxsize=32)
-def onward(constants: Constants) -> Array:
+def extrapolations(constants: Constants) -> Array:
     """Return the tables for first stages where steps vary: for a step of 1, for all `RATIOS`."""
     from integrators.coefficients import legendre
 

@@ -6,7 +6,17 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from integrators.kernel.context import BUDGET, DENSE, DONE, LAND, SIDE, SLIDING, UNDERFLOW, UNSCALED, Context
+from integrators.kernel.context import (
+    BUDGET,
+    DENSE,
+    DONE,
+    PARTIAL,
+    SLIDING,
+    STOP,
+    UNDERFLOW,
+    UNSCALED,
+    Context,
+)
 from integrators.kernel.native import engine
 from integrators.kernel.parts.kinks import KINKS_KEPT, NOTHING, START
 from integrators.kernel.step.rule import FIRST_AT_REST, RESTART, SCALE_LASTS
@@ -69,24 +79,25 @@ class AdaptiveStepper(HBVMStepper):
         (ends, _, place, out), ctx = self._room, self._context
         ends[0] = math.copysign(sys.float_info.max, ctx.controller.next_length)
         return self._is_one(
-            self._enter(engine.WALK, ctx.address, self._side.address, SIDE, 2, place, 0, 0, 0, out, 1), BUDGET
+            self._enter(engine.TAKE, ctx.address, self._partial.address, PARTIAL, 2, place, 0, 0, 0, out, 1),
+            BUDGET,
         )
 
     @one_thread
     def take(self, count: int) -> Samples:
         """Take ``count`` steps and return them."""
         ahead = self._context.controller.next_length > 0.0
-        return self.walk(sys.float_info.max if ahead else -sys.float_info.max, limit=count)
+        return self.take_steps(sys.float_info.max if ahead else -sys.float_info.max, limit=count)
 
     def march(self, end: float, most: int) -> Samples:
         """Take steps, ``most`` at most and none beyond the time ``end``; return them."""
-        return self.walk(end, limit=most)
+        return self.take_steps(end, limit=most)
 
     def _advance(self, grid: Array, sample: str) -> Samples:
         if sample == "steps":
-            return self.walk(float(grid[-1]), present=bool(grid[0] == self.t))
+            return self.take_steps(float(grid[-1]), present=bool(grid[0] == self.t))
         self._face(float(grid[-1]))
-        return self._to(grid, {"stop": LAND, "dense": DENSE}.get(sample, SIDE))
+        return self._to(grid, {"stop": STOP, "dense": DENSE}.get(sample, PARTIAL))
 
     def _stop(self) -> float:
         """Return the next breakpoint ahead, which no step passes; infinitely far if there is none."""
@@ -220,7 +231,7 @@ class AdaptiveStepper(HBVMStepper):
 
     def _seen(self, scout: "AdaptiveStepper") -> Array:
         """Return times and sizes on a trajectory to the goal: its first steps, and the end."""
-        pieces = [scout.walk(self._goal, limit=LOOK_AHEAD)]
+        pieces = [scout.take_steps(self._goal, limit=LOOK_AHEAD)]
         if not scout.status.failed and scout.stats.steps < LOOK_AHEAD:
             pieces.append(scout.advance([self._goal]))
         return np.concatenate([np.column_stack([made.t, np.abs(made.y)]) for made in pieces])
@@ -286,7 +297,7 @@ class AdaptiveStepper(HBVMStepper):
         return (Status.STALLED, why) if why else None
 
     @one_thread
-    def walk(
+    def take_steps(
         self, end: float, *, limit: int | None = None, longest: float = math.inf, present: bool = False
     ) -> Samples:
         """Take steps, none beyond the time ``end``, and return them.
@@ -294,7 +305,7 @@ class AdaptiveStepper(HBVMStepper):
         Parameters
         ----------
         end : float
-            The time to walk to; the step that would pass it is solved, kept and not taken.
+            The time to integrate to; the step that would pass it is solved, kept and not taken.
         limit : int, optional
             The largest number of steps.
         longest : float
@@ -319,7 +330,7 @@ class AdaptiveStepper(HBVMStepper):
             times, out = np.full(n + 1, stop if passes else end), np.empty((n + 1, self._dim))
             if self._vectors:
                 self._vectors.room(n + 1)
-            outcome = self._call(engine.WALK, SIDE, times, out, 0, n)
+            outcome = self._call(engine.TAKE, PARTIAL, times, out, 0, n)
             made = self._context.made
             steps += made
             pieces.append((times[:made], out[:made]))

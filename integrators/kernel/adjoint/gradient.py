@@ -97,7 +97,7 @@ class Adjoint:
         fixed = tables.fixed(self._constants)
         if c.route != tables.THROUGH:
             fixed["raw_matrix"] = tables.rounded(self._constants)
-        fixed["extrapolation"] = tables.onward(c) if c.route > tables.THROUGH else aligned(0)
+        fixed["extrapolation"] = tables.extrapolations(c) if c.route > tables.THROUGH else aligned(0)
         self.context = made = Context(own, fixed, {"padded": 2 * (-(-dim // 8) * 8)})
         made.solver.tolerance, made.solver.log_rest, made.varying = TOLERANCE, LOG_REST_VARYING, 1
         made.solver.rate = FIRST_RATE

@@ -35,7 +35,7 @@ class Search(Memory):
     degree = Integer()  # of the polynomials through the first samples; a power of 2
     steps = Integer()  # address of the compiled steps, for partial ones
     own = Integer()  # address of the trajectory's context
-    side = Integer()  # address of that for partial steps
+    partial = Integer()  # address of that for partial steps
     asked = Integer()  # address of `part`
     part = Real()  # length of the partial step ...
     part_known = Real()  # ... and of the last one from the same state, if there was one
@@ -51,7 +51,7 @@ class Search(Memory):
     known = Real()  # the time up to which all is known
     evaluations = Integer()  # of the field, for partial steps
     iterations = Integer()
-    partial = Integer()  # partial steps
+    partial_steps = Integer()
 
     # --- what has happened; arrays that the owner empties, and makes larger ---
     room = Integer()

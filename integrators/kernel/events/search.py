@@ -85,13 +85,13 @@ class KernelSearch:
         contexts: tuple[Context, Context], steps: int, end: float,
     ):  # fmt: skip
         self._functions, self._actions = functions, actions
-        self._context, side = contexts
+        self._context, partial = contexts
         self._dim, n = self._context.shape.dim, len(events)
         degree = 1 << (min(max(2 * self._context.s, LEAST), MOST) - 1).bit_length()
         numbers = {
             "count": n, "dim": self._dim, "degree": degree, "chunks": degree // 8, "terms": self._context.s,
-            "steps": steps, "own": self._context.address, "side": side.address, "made_rows": 1 + self._dim,
-            "last": end, "sign": 1.0 if end >= self._context.t0 else -1.0,
+            "steps": steps, "own": self._context.address, "partial": partial.address,
+            "made_rows": 1 + self._dim, "last": end, "sign": 1.0 if end >= self._context.t0 else -1.0,
         }  # fmt: skip
         cosines, self._tables, transforms = _tables()
         self._memory = memory = Search(numbers, {"cosines": cosines, "transforms": transforms})
@@ -204,7 +204,7 @@ class KernelSearch:
         """Go on from where `save` was called."""
         for name, array in kept["arrays"].items():
             getattr(self._memory, name)[:] = array
-        self._memory.known, self._memory.partial = kept["known"], kept["work"]["partial_steps"]
+        self._memory.known, self._memory.partial_steps = kept["known"], kept["work"]["partial_steps"]
         self._memory.evaluations, self._memory.iterations = (
             kept["work"][name] for name in ("evaluations", "iterations")
         )
@@ -217,6 +217,6 @@ class KernelSearch:
         """Return what the search has cost."""
         memory = self._memory
         return {
-            "partial_steps": memory.partial, "evaluations": memory.evaluations,
+            "partial_steps": memory.partial_steps, "evaluations": memory.evaluations,
             "iterations": memory.iterations,
         }  # fmt: skip

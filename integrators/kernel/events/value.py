@@ -18,14 +18,14 @@ context = view(Context)
 
 
 @intrinsic
-def call_part(typing, steps, what, own, side, part, out):
+def call_part(typing, steps, what, own, partial, part, out):
     """Call the compiled steps for a partial step; see `integrators.kernel.step.entry`."""
 
     def generate(context, builder, sig, args):
-        function, what, own, side, part, out = args
+        function, what, own, partial, part, out = args
         none = ir.Constant(INTEGER, 0)
         out = builder.ptrtoint(out, INTEGER)
-        words = [what, own, side, none, none, none, none, part, none, out, none]
+        words = [what, own, partial, none, none, none, none, part, none, out, none]
         kind = ir.FunctionType(INTEGER, [INTEGER] * len(words))
         return builder.call(builder.inttoptr(function, kind.as_pointer()), words)
 
@@ -56,15 +56,15 @@ def state_at(ctx, search, t):
     search.cache_next = (i + 1) % CACHED
     search.cache_times[i] = t
     search.part = part_at(search, t)
-    side = context(search.side)
-    outcome = call_part(search.steps, PART, search.own, search.side, search.asked, state)
+    partial = context(search.partial)
+    outcome = call_part(search.steps, PART, search.own, search.partial, search.asked, state)
     # A partial step that only the implicit solver would solve is none: steps do not change.
     ctx.implicit.wanted = 0
-    search.iterations += side.counters.iterations
-    search.evaluations += side.counters.evaluations
-    search.partial += 1
+    search.iterations += partial.counters.iterations
+    search.evaluations += partial.counters.evaluations
+    search.partial_steps += 1
     search.part_known = search.part if outcome == DONE else 0.0
-    side.counters.iterations = side.counters.evaluations = side.counters.restarts = 0
+    partial.counters.iterations = partial.counters.evaluations = partial.counters.restarts = 0
     if outcome != DONE:
         for d in range(search.dim):
             state[d] = NAN

@@ -50,10 +50,10 @@ def turns_between(search, i, a, b):
     """Whether the parabola through place i and its neighbours turns back from zero between two places."""
     x, p = search.places + (i - 1), search.fine + (i - 1)
     left, right = (p[1] - p[0]) / (x[1] - x[0]), (p[2] - p[1]) / (x[2] - x[1])
-    bend = (right - left) / (x[2] - x[0])
-    if bend * p[1] <= 0.0:
+    curvature = (right - left) / (x[2] - x[0])
+    if curvature * p[1] <= 0.0:
         return False
-    turn = x[1] - (left + bend * (x[1] - x[0])) / (2.0 * bend)
+    turn = x[1] - (left + curvature * (x[1] - x[0])) / (2.0 * curvature)
     return a < turn and turn < b
 
 

@@ -32,8 +32,8 @@ FORGET = 0.7  # of the rate of contraction, from one step to the next
 SLOW = 0.2  # a Jacobian whose corrections contract no better is replaced at the next step
 HOPELESS = 4  # corrections that do not decrease, or grow, to give up
 OLDEST = 64  # steps for which a Jacobian is used, so that the contraction is known anew
-GENTLE = 0.25  # contraction of the fixed-point iteration at which that is to be tried again
-CALM = 1e-3  # sizes are measured until changes are this small
+CONTRACTS_AGAIN = 0.25  # contraction of the fixed-point iteration at which that is to be tried again
+SIZES_SETTLED = 1e-3  # sizes are measured until changes are this small
 FALLEN = 0.02  # down to this, a step's coefficients must halve from each to the next after a rescue
 
 
@@ -56,7 +56,7 @@ def iterate(ctx, m, which):
             if outcome != DONE:
                 return outcome if tried == 1 else DIVERGED
         set_stages(ctx, m)
-        if rough > CALM:
+        if rough > SIZES_SETTLED:
             measure(ctx, m)
         if tried == 0:
             continue
@@ -65,7 +65,7 @@ def iterate(ctx, m, which):
         m.change = rough
         if not rough < INFINITY:
             return DIVERGED
-        if before < CALM and rough > STAGNATION:
+        if before < SIZES_SETTLED and rough > STAGNATION:
             worst = max(worst, rough / before)
         if strict <= tolerance or strict * max(worst, rate) < FORESEEN * tolerance:
             break
@@ -208,7 +208,7 @@ def solve_step(ctx, m, started):
         longer = abs(h / m.contraction_h)
         if ctx.second:
             longer *= longer
-        if implicit.left < 0 and longer * m.contraction < GENTLE:
+        if implicit.left < 0 and longer * m.contraction < CONTRACTS_AGAIN:
             implicit.active = 0
     solver.last = m.change
     m.corrections += m.tried

@@ -83,10 +83,10 @@ class Kept:
         """Return fresh memory for a trajectory."""
         return LineContext(shape, tables, self._numbers, self._tables)
 
-    def share(self, own: Context, side: Context) -> None:
+    def share(self, own: Context, partial: Context) -> None:
         """Let partial steps keep what the steps do."""
         for name in ("active", "owed", "metric") if self.names else ():
-            side.point({name: getattr(own, name)})
+            partial.point({name: getattr(own, name)})
 
     @property
     def arrays(self) -> tuple[str, ...]:
@@ -110,8 +110,8 @@ class Kept:
 
     def load(self, contexts: tuple[Any, Any], y: Array, par: Array, t0: float) -> None:
         """Put into a pair of contexts what follows from the start (t0, y) and from the parameters."""
-        own, side = contexts
-        own.lost = own.defect = side.defect = 0
+        own, partial = contexts
+        own.lost = own.defect = partial.defect = 0
         if self.names:
             own.metric[:] = metric_of(self.system, par)
             own.active[:] = independent(self.system, self.values, own.metric, y, par, t0)

@@ -11,8 +11,8 @@ from integrators.kernel.native import binary, lowered, store
 from integrators.kernel.native.raised import Interrupts, calls_back, raise_kept
 
 # What the entry of `step` can do; see `integrators.kernel.step.entry`.
-RESET, ADVANCE, WALK, PART = range(4)
-ENTRY = "what ctx side between count times targets parts first out budget"
+RESET, ADVANCE, TAKE, PART = range(4)
+ENTRY = "what ctx partial between count times targets parts first out budget"
 
 WAIT = "integrators: compiling the kernel for this processor, once: 2 to 10 s (ahead: `hbvm-bench warm`)"
 

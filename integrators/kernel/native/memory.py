@@ -270,7 +270,9 @@ class Memory(_Slots):
 
     def __init__(self, numbers: Mapping[str, float], arrays: Mapping[str, NDArray[Any]]):
         def size(n: int | str, part: str) -> int:
-            return n if isinstance(n, int) else int(numbers[part + n if part + n in self.word_of else n])
+            if isinstance(n, int):
+                return n
+            return int(numbers[part + n if isinstance(self._all.get(part + n), Integer) else n])
 
         end = -(-self._size // LINE) * LINE
         self._own: dict[str, tuple[int, int]] = {}  # where an array begins and ends

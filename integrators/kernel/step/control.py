@@ -6,7 +6,7 @@ from integrators.kernel.native.jit import for_both_widths
 from integrators.kernel.simd.operations import binary_log, greatest, least, where
 
 SAFETY, SHRINK = 0.9, 0.2  # of the length from one step to the next
-RECOIL = 0.7  # of what would have met the tolerance, after a step whose error was too large (logarithms)
+SHRINKING = 0.7  # of what would have met the tolerance, after a step whose error was too large (logarithms)
 TRUST = 0.2  # of a trend to longer steps
 # For a trend, the step before might have been 20 times as long at most (logarithm): estimates below that, in
 # a field near the smallest doubles, vary by any factor.
@@ -46,7 +46,7 @@ def log_factor(aim, estimate, behind, change):
     factor = aim - estimate
     trend = change + greatest(aim - FORESEEN, behind) - estimate
     trend = where(behind < INFINITY, where(trend < 0.0, trend, TRUST * trend), 0.0)
-    return where(factor < 0.0, RECOIL * factor, greatest(CAUTION * factor, factor - HELD) + trend)
+    return where(factor < 0.0, SHRINKING * factor, greatest(CAUTION * factor, factor - HELD) + trend)
 
 
 @for_both_widths

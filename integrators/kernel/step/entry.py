@@ -4,16 +4,16 @@ from integrators.kernel.context import DONE
 from integrators.kernel.native.engine import ADVANCE, PART, RESET
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.views import doubles, integers
-from integrators.kernel.step.loop import advance, context, reset, walk
+from integrators.kernel.step.loop import advance, context, reset, take_steps
 from integrators.kernel.step.sample import part_step, write
 
 
 @compiled
-def entry(what, ctx, side, between, count, times, targets, parts, first, out, budget):
+def entry(what, ctx, partial, between, count, times, targets, parts, first, out, budget):
     """Do what ``what`` names; all arguments are integers or addresses.
 
     RESET: put the trajectory at the state at ``out``. ADVANCE: see `loop.advance`.
-    WALK: take up to ``budget`` steps, none beyond times[0], which are then in ``times``.
+    TAKE: take up to ``budget`` steps, none beyond times[0], which are then in ``times``.
     PART: write the state parts[0] beyond the present one to ``out``, and count nothing; parts[1] is
     the length of the last one from there, or 0.
     """
@@ -22,10 +22,10 @@ def entry(what, ctx, side, between, count, times, targets, parts, first, out, bu
         reset(context(ctx), y)
         return DONE
     if what == ADVANCE:
-        return advance(context(ctx), context(side), between, count, t, n, p, first, y, budget)
+        return advance(context(ctx), context(partial), between, count, t, n, p, first, y, budget)
     if what == PART:
-        outcome = part_step(context(ctx), context(side), p[0], p[1])
+        outcome = part_step(context(ctx), context(partial), p[0], p[1])
         if outcome == DONE:
-            write(context(side), context(side).next_state, y)
+            write(context(partial), context(partial).next_state, y)
         return outcome
-    return walk(context(ctx), t, y, budget)
+    return take_steps(context(ctx), t, y, budget)

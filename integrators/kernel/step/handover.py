@@ -12,11 +12,11 @@ SHORTEST, LONGEST = 16, 256  # steps for which it then stays, twice as many each
 
 
 @compiled
-def solve_implicitly(ctx, side, started):
-    """Solve the step in ``side``, ``ctx`` itself or a partial step of it, by the implicit solver."""
+def solve_implicitly(ctx, partial, started):
+    """Solve the step in ``partial``, ``ctx`` itself or a partial step of it, by the implicit solver."""
     ctx.counters.implicit_steps += 1 - started
     ctx.older_length = 0.0
-    return call_solver(side.implicit.code, side, side.implicit.memory, started)
+    return call_solver(partial.implicit.code, partial, partial.implicit.memory, started)
 
 
 @compiled
@@ -45,14 +45,14 @@ def reconsider(ctx, outcome):
 
 
 @compiled
-def settle_part(ctx, side):
-    """Solve a partial step of ``ctx``, prepared in ``side``; return the outcome."""
+def settle_part(ctx, partial):
+    """Solve a partial step of ``ctx``, prepared in ``partial``; return the outcome."""
     if ctx.implicit.active:
-        return solve_implicitly(ctx, side, 1)
-    outcome = settle(side)
+        return solve_implicitly(ctx, partial, 1)
+    outcome = settle(partial)
     if outcome == DONE or ctx.implicit.strategy == FIXED_POINT:
         return outcome
-    if side.implicit.code == 0:
+    if partial.implicit.code == 0:
         return want_solver(ctx)
-    side.solver.predicted = 0
-    return solve_implicitly(ctx, side, 1)
+    partial.solver.predicted = 0
+    return solve_implicitly(ctx, partial, 1)

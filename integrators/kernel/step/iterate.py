@@ -39,7 +39,7 @@ def test(ctx, strict):
     if converged or (stalled > 0.0 and stagnates(change(ctx, blocks.floored_weights), stalled)):
         left = left_over(converged, rest, best)
         if left > 0.0:
-            polish(ctx, left)
+            extra_iterations(ctx, left)
         else:
             solver.outcome = DONE
     elif solver.tried >= MAX_ITERATIONS:
@@ -47,7 +47,7 @@ def test(ctx, strict):
 
 
 @compiled
-def polish(ctx, change):
+def extra_iterations(ctx, change):
     """Iterate until next to nothing is left of a change, without a test, and let the step be solved.
 
     The last evaluation is at the newest stages: the field's values have the error of the

@@ -184,15 +184,15 @@ def misses(ctx, d, value):
 
 
 @compiled
-def keep_end_of_part(ctx, side):
-    """Let the step ahead be compared with the partial step in ``side``, at whose end it begins."""
+def keep_end_of_part(ctx, partial):
+    """Let the step ahead be compared with the partial step in ``partial``, at whose end it begins."""
     ctx.kinks.border = NOTHING
     if ctx.line or ctx.implicit.active or not ctx.kinks.doubt < INFINITY:
         return
-    estimate(side)
+    estimate(partial)
     for d in range(ctx.rows):
-        put(ctx.kinks.borders_behind, 8 * d, get(side.kinks.borders, 8 * d))
-        ctx.kinks.lasts_behind[d] = side.kinks.lasts[d]
+        put(ctx.kinks.borders_behind, 8 * d, get(partial.kinks.borders, 8 * d))
+        ctx.kinks.lasts_behind[d] = partial.kinks.lasts[d]
     ctx.kinks.border = SEEN
 
 

@@ -91,20 +91,20 @@ def approach(ctx, t, budget):
 
 
 @compiled
-def advance(ctx, side, between, count, times, targets, parts, first, out, budget):
+def advance(ctx, partial, between, count, times, targets, parts, first, out, budget):
     """Take steps, and make the states asked for.
 
     Parameters
     ----------
-    ctx, side : Context
+    ctx, partial : Context
         Of the trajectory, and for partial steps.
-    between : {SIDE, LAND, DENSE}
+    between : {PARTIAL, STOP, DENSE}
         How states between steps are made.
     count : int
         Samples.
     times, targets, parts : doubles, integers, doubles; ``count`` of each
         Sample i is at times[i]. With fixed step size that is parts[i] beyond step
-        n = targets[i]; `LAND` counts from sample i - 1.
+        n = targets[i]; `STOP` counts from sample i - 1.
     first : int
         The first sample still to be made.
     out : (count, dim) doubles
@@ -131,7 +131,7 @@ def advance(ctx, side, between, count, times, targets, parts, first, out, budget
                 outcome, budget = repeat(ctx, targets[i], budget)
                 part = parts[i]
             if outcome == DONE:
-                outcome = sample(ctx, side, between, times[i], part, out + dim * i)
+                outcome = sample(ctx, partial, between, times[i], part, out + dim * i)
         if outcome != DONE:
             return outcome
     ctx.made = count
@@ -139,7 +139,7 @@ def advance(ctx, side, between, count, times, targets, parts, first, out, budget
 
 
 @compiled
-def walk(ctx, times, out, budget):
+def take_steps(ctx, times, out, budget):
     """Take ``budget`` adaptive steps at most, and note their times and states.
 
     None goes beyond times[0]. With a budget of 0, only look whether a step remains to be taken.

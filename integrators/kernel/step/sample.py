@@ -1,6 +1,6 @@
 """States between steps, and where a state is in memory."""
 
-from integrators.kernel.context import DENSE, DONE, LAND, LANDING, PART_END, SIDE, STATE, UNSEEN, UNSOLVED
+from integrators.kernel.context import DENSE, DONE, PART_END, PARTIAL, STATE, STOP, STOPPED, UNSEEN, UNSOLVED
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.memory import call_follow, get, put
 from integrators.kernel.step.advance import solve
@@ -103,35 +103,35 @@ def interpolate(ctx, c, out):
 
 
 @compiled
-def part_step(ctx, side, part, known):
-    """Solve in ``side`` a step of length ``part`` from the state of ``ctx``; leaves ``ctx`` as it is.
+def part_step(ctx, partial, part, known):
+    """Solve in ``partial`` a step of length ``part`` from the state of ``ctx``; leaves ``ctx`` as it is.
 
-    First stages come from the partial step of length ``known`` that ``side`` has made from there; if that
+    First stages come from the partial step of length ``known`` that ``partial`` has made from there; if that
     is 0, from inside the step ahead if that is solved, else from the step behind.
     """
-    set_step(side, part)
-    copy(ctx.state, side.state, vectors_of_state(ctx))
-    copy(ctx.error, side.error, vectors_of_state(ctx))
-    side.n = 0
-    side.t0, side.time_low = time_of_step(ctx.t0, ctx.time_low, float(ctx.n), ctx.h)
-    rewind(side)
-    prepare(side)
+    set_step(partial, part)
+    copy(ctx.state, partial.state, vectors_of_state(ctx))
+    copy(ctx.error, partial.error, vectors_of_state(ctx))
+    partial.n = 0
+    partial.t0, partial.time_low = time_of_step(ctx.t0, ctx.time_low, float(ctx.n), ctx.h)
+    rewind(partial)
+    prepare(partial)
     if known != 0.0:
-        predict(side, side, known, 0.0)
+        predict(partial, partial, known, 0.0)
     elif ctx.solved:
-        predict(side, ctx, ctx.h, 0.0)
+        predict(partial, ctx, ctx.h, 0.0)
     else:
-        predict(side, ctx, ctx.length, 1.0)
-    side.estimate.rescaled = ctx.estimate.rescaled
-    side.energy.start, side.energy.scale = ctx.energy.start, ctx.energy.scale
+        predict(partial, ctx, ctx.length, 1.0)
+    partial.estimate.rescaled = ctx.estimate.rescaled
+    partial.energy.start, partial.energy.scale = ctx.energy.start, ctx.energy.scale
     if ctx.estimate.rescaled:
         for b in range(ctx.blocks.count):
-            side.estimate.expected[b] = ctx.estimate.expected[b]
-    take_sizes(side)
+            partial.estimate.expected[b] = ctx.estimate.expected[b]
+    take_sizes(partial)
     # Not that of another partial step: states depend on nothing but where they are.
-    side.solver.rate = ctx.solver.rate
-    outcome = settle_part(ctx, side)
-    return finish(side) if outcome == DONE else outcome
+    partial.solver.rate = ctx.solver.rate
+    outcome = settle_part(ctx, partial)
+    return finish(partial) if outcome == DONE else outcome
 
 
 @compiled
@@ -147,12 +147,12 @@ def changes(ctx):
 
 
 @compiled
-def add_counters(ctx, side):
-    """Count the work done in ``side`` as that of ``ctx``."""
-    ctx.counters.iterations += side.counters.iterations
-    ctx.counters.evaluations += side.counters.evaluations
-    ctx.counters.restarts += side.counters.restarts
-    side.counters.iterations = side.counters.evaluations = side.counters.restarts = 0
+def add_counters(ctx, partial):
+    """Count the work done in ``partial`` as that of ``ctx``."""
+    ctx.counters.iterations += partial.counters.iterations
+    ctx.counters.evaluations += partial.counters.evaluations
+    ctx.counters.restarts += partial.counters.restarts
+    partial.counters.iterations = partial.counters.evaluations = partial.counters.restarts = 0
     ctx.counters.partial_steps += 1
 
 
@@ -163,16 +163,16 @@ def set_time(ctx, t):
 
 
 @compiled
-def land(ctx, side, t):
-    """Make the end of the step in ``side``, at time ``t``, the state of ``ctx``."""
-    copy(side.next_state, ctx.state, vectors_of_state(ctx))
-    copy(side.next_error, ctx.error, vectors_of_state(ctx))
-    copy(side.values, ctx.values, ctx.calls * ctx.padded * ctx.lanes // 8)
-    ctx.length, ctx.older_length = side.h, 0.0
+def stop_at(ctx, partial, t):
+    """Make the end of the step in ``partial``, at time ``t``, the state of ``ctx``."""
+    copy(partial.next_state, ctx.state, vectors_of_state(ctx))
+    copy(partial.next_error, ctx.error, vectors_of_state(ctx))
+    copy(partial.values, ctx.values, ctx.calls * ctx.padded * ctx.lanes // 8)
+    ctx.length, ctx.older_length = partial.h, 0.0
     ctx.surfaces.on_surface = 0
     if ctx.varying:
-        keep_end_of_part(ctx, side)
-        ctx.controller.length_behind = side.h
+        keep_end_of_part(ctx, partial)
+        ctx.controller.length_behind = partial.h
     set_time(ctx, t)
     ctx.solved = UNSOLVED
     arrive(ctx)
@@ -180,7 +180,7 @@ def land(ctx, side, t):
 
 @compiled
 def followed(ctx, step, what):
-    """Let vectors that follow ``ctx`` know of ``what`` of a step, in ``ctx`` or of its side; the outcome."""
+    """Let vectors that follow ``ctx`` know of ``what`` of a step, whole or partial; return the outcome."""
     if ctx.follow == 0:
         return DONE
     step.made = ctx.made
@@ -188,17 +188,17 @@ def followed(ctx, step, what):
 
 
 @compiled
-def sample(ctx, side, between, t, part, out):
+def sample(ctx, partial, between, t, part, out):
     """Write the state ``part`` beyond the present one; return the outcome."""
     if part == 0.0:
         write(ctx, ctx.state, out)
         followed(ctx, ctx, STATE)
-        if between == LAND:
+        if between == STOP:
             low = (ctx.t0 - t) + ctx.time_low if ctx.varying else 0.0
             set_time(ctx, t)
             ctx.time_low = low  # the state is where it was: what is between the two times is not lost
         return DONE
-    if between in (DENSE, SIDE):
+    if between in (DENSE, PARTIAL):
         # A part starts from the step ahead. Where that fails, nothing in it is reached: near a
         # singularity the equations of a part may have a solution, far from the trajectory.
         outcome = solve(ctx)
@@ -207,18 +207,18 @@ def sample(ctx, side, between, t, part, out):
     if between == DENSE:
         interpolate(ctx, part / ctx.h, out)
         return DONE
-    outcome = part_step(ctx, side, part, 0.0)
-    add_counters(ctx, side)
-    if outcome == DONE and ctx.varying and ctx.estimate.blind and ctx.events.act == 0 and changes(side):
+    outcome = part_step(ctx, partial, part, 0.0)
+    add_counters(ctx, partial)
+    if outcome == DONE and ctx.varying and ctx.estimate.blind and ctx.events.act == 0 and changes(partial):
         # The step ahead was judged by nodes that see nothing of this: it is solved again, and no longer.
         ctx.solved, ctx.length, ctx.controller.next_length = UNSOLVED, 0.0, part
         ctx.counters.rejections += 1
         return UNSEEN
     if outcome == DONE:
-        outcome = followed(ctx, side, PART_END)
+        outcome = followed(ctx, partial, PART_END)
     if outcome == DONE:
-        write(side, side.next_state, out)
-        if between == LAND:
-            followed(ctx, side, LANDING)
-            land(ctx, side, t)
+        write(partial, partial.next_state, out)
+        if between == STOP:
+            followed(ctx, partial, STOPPED)
+            stop_at(ctx, partial, t)
     return outcome

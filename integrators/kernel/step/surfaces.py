@@ -17,7 +17,7 @@ from integrators.kernel.step.sample import interpolate
 
 # What comes of a step that crosses a surface, or was to end on one: judged like all others; tried again with
 # `Controller.next_length`; it ends on the surface.
-ORDINARY, AGAIN, LANDED = range(3)
+ORDINARY, AGAIN, REACHED = range(3)
 
 MOST_TRIALS = 16  # of lengths of a step
 BEYOND = 1.25  # of a step is as far as its polynomial is trusted
@@ -117,7 +117,7 @@ def locate(ctx, outcome, fits):
         return ORDINARY
     apart = abs(part - 1.0)
     if apart <= ROUNDED or (apart <= NEARLY and apart >= FALLS * surfaces.distance):
-        return LANDED if fits else ORDINARY
+        return REACHED if fits else ORDINARY
     surfaces.distance = apart
     length = part * h
     if surfaces.across == NO_SURFACE:

@@ -44,12 +44,12 @@ from integrators.kernel.step.estimate import estimate, estimate_implicit, log_de
 from integrators.kernel.step.finish import count_step, finish
 from integrators.kernel.step.graze import grazes
 from integrators.kernel.step.handover import solve_implicitly, want_solver
-from integrators.kernel.step.iterate import close, polish, settle, test
+from integrators.kernel.step.iterate import close, extra_iterations, settle, test
 from integrators.kernel.step.kinks import count, keep_end, kink, undo
 from integrators.kernel.step.reversible import keep_pace
 from integrators.kernel.step.rule import FIRST_RATE, FUTILE_PART, ROUNDING, SCALE_LASTS
 from integrators.kernel.step.sums import time_after
-from integrators.kernel.step.surfaces import AGAIN, LANDED, leave, locate, look_across
+from integrators.kernel.step.surfaces import AGAIN, REACHED, leave, locate, look_across
 from integrators.kernel.step.sweep import sweep_measured
 
 GROW = FARTHEST  # of the length from one step to the next, at most
@@ -61,7 +61,7 @@ BUSY = 18.0
 MOST_UNTESTED = 12
 MOST, TRIAL = 3.0, 4  # times as many iterations as that are too many, if it looks like it after a trial
 LEAST_RATE, MOST_RATE = log2(1e-4), log2(0.9)
-HOPE = log2(0.7)  # where the last change was nothing, the contraction may be this part of what was thought
+LOG_RATE_UNSEEN = log2(0.7)  # to the logarithm of the contraction, where the last change was nothing
 # The implicit solver takes over after so many steps in a row that the iteration keeps from growing where the
 # errors would allow so much longer ones. Its steps cost one or two of 18 sweeps through memory, and ten of
 # those of few rows or of the second-order form; the more rows, the more. Beyond MOST_ROWS they are too dear
@@ -122,14 +122,14 @@ def iterate(ctx):
             change = binary_log(strict)
             rate = min(max((change - first) / tries, LEAST_RATE), MOST_RATE)
         elif strict == 0.0 and tries > 1:
-            rate = max(rate + HOPE, LEAST_RATE)
+            rate = max(rate + LOG_RATE_UNSEEN, LEAST_RATE)
         solver.rate = rate
         test(ctx, strict)
         if solver.tried <= tried:  # started anew
             return settle(ctx)
         if solver.outcome == RUNNING:
             if strict <= trusted:
-                polish(ctx, strict)
+                extra_iterations(ctx, strict)
             elif tries >= TRIAL and tries + (solver.log_rest - change) / rate > most:
                 solver.outcome = DIVERGED  # not yet, but a shorter step is cheaper
                 solver.rate = known
@@ -341,8 +341,8 @@ def accepts(ctx, outcome, iterations, implicit):
         if found == AGAIN:
             again(ctx, outcome, implicit)
             return False
-        if found == LANDED:
-            land_on_surface(ctx, factor, iterations, implicit)
+        if found == REACHED:
+            end_on_surface(ctx, factor, iterations, implicit)
             return True
         surfaces.locating = 0
         if surfaces.across != NO_SURFACE:
@@ -428,7 +428,7 @@ def again(ctx, outcome, implicit):
 
 
 @compiled
-def land_on_surface(ctx, factor, iterations, implicit):
+def end_on_surface(ctx, factor, iterations, implicit):
     """Let the attempted step, which ends on a switching surface, be followed by one as long as was wanted."""
     count(ctx, ctx.t0 + ctx.h, 0.0)
     follow(ctx, factor, iterations, implicit)

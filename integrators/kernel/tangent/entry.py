@@ -18,10 +18,10 @@ from integrators.kernel.context import (
     BUDGET,
     BY_INCREMENT,
     DONE,
-    LANDING,
     PART_END,
     STATE,
     STEP,
+    STOPPED,
     UNSOLVED,
     Context,
 )
@@ -167,27 +167,27 @@ def entry(what, address, place):
     trajectory = context(memory.trajectory)
     first = 0
     for g in range(memory.groups):
-        own, side = context(memory.own[g]), context(memory.side[g])
+        own, partial = context(memory.own[g]), context(memory.partial[g])
         outcome = DONE
         if what == STATE:
             write_vectors(memory, g, first, own, own.state, ctx.made)
-        elif what == LANDING:
-            copy(side.next_state, own.state, vectors_of_state(own))
-            copy(side.next_error, own.error, vectors_of_state(own))
-            copy(side.values, own.values, own.calls * own.padded * own.lanes // 8)
-            own.length, own.older_length = side.h, 0.0
+        elif what == STOPPED:
+            copy(partial.next_state, own.state, vectors_of_state(own))
+            copy(partial.next_error, own.error, vectors_of_state(own))
+            copy(partial.values, own.values, own.calls * own.padded * own.lanes // 8)
+            own.length, own.older_length = partial.h, 0.0
         elif what == PART_END:
-            copy(own.state, side.state, vectors_of_state(own))
-            copy(own.error, side.error, vectors_of_state(own))
-            outcome = differentiate(ctx, trajectory, side, own, True, memory.pulls[g])
+            copy(own.state, partial.state, vectors_of_state(own))
+            copy(own.error, partial.error, vectors_of_state(own))
+            outcome = differentiate(ctx, trajectory, partial, own, True, memory.pulls[g])
             if outcome == DONE:
-                write_vectors(memory, g, first, side, side.next_state, ctx.made)
+                write_vectors(memory, g, first, partial, partial.next_state, ctx.made)
         else:
             outcome = differentiate(ctx, trajectory, own, own, False, memory.pulls[g])
         if outcome == BUDGET:
             return outcome
         if outcome != DONE:
-            own.solved = side.solved = UNSOLVED
+            own.solved = partial.solved = UNSOLVED
             memory.failed = 1
             return outcome
         first += memory.vectors[g]

@@ -16,7 +16,7 @@ class Tangents(Memory):
     count = Integer()  # vectors
     groups = Integer()
     own = Array("groups", of=int)  # addresses of the groups' contexts,
-    side = Array("groups", of=int)  # of those for partial steps,
+    partial = Array("groups", of=int)  # of those for partial steps,
     pulls = Array("groups", of=int)  # and of the relative derivatives of velocities, by row; 0: none
     vectors = Array("groups", of=int)  # in each group
     room = Array("room_size")  # for the state of a group

@@ -86,7 +86,7 @@ class Vectors:
             {},
         )  # fmt: skip
         memory.own[:] = [own.address for own, _ in self._pairs]
-        memory.side[:] = [side.address for _, side in self._pairs]
+        memory.partial[:] = [partial.address for _, partial in self._pairs]
         memory.vectors[:] = [part.size for part in parts]
         self._kept_pulls = pulls
         memory.pulls[:] = [0 if pull is None else pull.ctypes.data for pull in pulls]

@@ -111,7 +111,7 @@ class NativeSteps:
     def _own(self) -> Samples:
         """Take steps, none beyond the bound."""
         if self._fixed is None:
-            return self._stepper.walk(self._t_bound, limit=self._every, longest=self._longest)
+            return self._stepper.take_steps(self._t_bound, limit=self._every, longest=self._longest)
         times = self._fixed.next(self._every)
         if not times.size:
             return Samples(times, np.empty((0, self._before[1].size)), Status.RUNNING)

@@ -331,7 +331,9 @@ def test_lengths_are_those_that_first_stages_have_tables_for(k, s):
 def test_the_tables_extrapolate_a_polynomial():
     c = tables.constants(16, 14, False, 16)
     nodes = c.arrays["nodes"].reshape(-1)
-    made = tables.onward(c).reshape(tables.RATIOS.size, 2, 16, 8)  # groups of eight stages, column by column
+    made = tables.extrapolations(c).reshape(
+        tables.RATIOS.size, 2, 16, 8
+    )  # groups of eight stages, column by column
     for ratio, table in zip(tables.RATIOS, made, strict=True):
         stages = (table.transpose(0, 2, 1).reshape(16, 16)) @ nodes**3
         there = ((1.0 + ratio * nodes) ** 4 - 1.0) / (4.0 * ratio)
