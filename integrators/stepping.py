@@ -27,7 +27,14 @@ from integrators.protocol import (
     UserError,
     sampling_named,
 )
-from integrators.refusals import check_parameters, check_start, check_state, check_times, one_thread
+from integrators.refusals import (
+    are_finite,
+    check_parameters,
+    check_start,
+    check_state,
+    check_times,
+    one_thread,
+)
 from integrators.running.checkpoints import Identity
 from integrators.running.times import plan
 from integrators.running.watchdog import Crawl
@@ -179,8 +186,7 @@ class StepperBase:
         Short runs are timed this way, and each of NumPy's calls left out here weighs in them.
         """
         grid, states = self._serve(time.copy(), "stop")
-        if grid.size and not all(map(math.isfinite, states[-1].tolist())):
-            self._finite(float(grid[-1]), states[-1])
+        if grid.size and not self._finite(float(grid[-1]), states[-1]):
             grid, states = grid[:-1], states[:-1]
         if grid.size and not self._status.failed:
             self._t, self._y = time.item(), states[-1].copy()
@@ -191,7 +197,7 @@ class StepperBase:
         self._t, self._y = t, np.array(y, dtype=np.float64)
 
     def _finite(self, t: float, y: Array) -> bool:
-        if np.isfinite(y).all():
+        if are_finite(y):
             return True
         if not self._status.failed:
             self._fail(Status.NOT_FINITE, t, f"the state is not finite at t = {t!r}.")

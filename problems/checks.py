@@ -250,10 +250,9 @@ class Arguments:
         self._by_place = [
             key for key, parameter in self.parameters.items() if parameter.kind is not parameter.KEYWORD_ONLY
         ]
-        self._by_name = [
-            key for key, parameter in self.parameters.items() if parameter.kind is parameter.KEYWORD_ONLY
-        ]
         self._needed = [key for key, parameter in self.parameters.items() if parameter.default is EMPTY]
+        # Values by place, and none by name, that are a call.
+        self._enough = max((1 + [*self.parameters].index(key) for key in self._needed), default=0)
         self._free = {
             key for key, parameter in self.parameters.items() if _allows_everything(parameter.annotation)
         }
@@ -274,6 +273,8 @@ class Arguments:
             For values by place that have to be named, one given twice, or one missing.
         """
         name, by_place = self.name, self._by_place
+        if not options and self._enough <= len(values) <= len(by_place):
+            return
         for option in options:
             if option not in self.parameters:
                 raise unknown(f"{self.kind} of {name}", option, self.parameters)
@@ -340,10 +341,28 @@ class Arguments:
             call[key] = value if key in self._free else self._used(key, value)
         return call
 
-    def split(self, call: Mapping[str, Any]) -> tuple[list[Any], dict[str, Any]]:
-        """Return the arguments of a call by place and by name, as Python takes them."""
-        by_name = dict(zip(self._by_name, map(call.__getitem__, self._by_name), strict=True))
-        return list(map(call.__getitem__, self._by_place)), by_name
+    @functools.cached_property
+    def _converted(self) -> dict[str, Any]:
+        """The defaults that a call gets in another form than they are written in."""
+        return {
+            key: value for key, value in self._unchecked.items() if value is not self.parameters[key].default
+        }
+
+    def given(
+        self, values: Sequence[Any], options: Mapping[str, Any]
+    ) -> tuple[Sequence[Any], Mapping[str, Any]]:
+        """Return what a call gives by place and by name, checked as by `bind`; Python knows the defaults."""
+        self.check_names(values, options)
+        free = self._free
+        placed = [
+            value if key in free else self._used(key, value)
+            for key, value in zip(self._by_place, values, strict=False)
+        ]
+        named = {key: value if key in free else self._used(key, value) for key, value in options.items()}
+        for key, value in self._converted.items():
+            if key not in options and key not in self._by_place[: len(values)]:
+                named[key] = value
+        return placed, named
 
     def printed(self, values: Mapping[str, Any], first: Iterable[str] = ()) -> dict[str, Any]:
         """Return what a call is printed with: ``first``, then what differs from its default."""
@@ -379,6 +398,7 @@ def _checking(function: Callable[P, R], owner: str | None) -> Callable[P, R]:
     names = list(signature.parameters)
     bound = int(names[:1] == ["self"])  # a method's own object is no argument of a call
     own = signature.replace(parameters=list(signature.parameters.values())[bound:])
+    makes = function.__name__ == "__init__"
 
     @functools.cache
     def arguments(name: str) -> Arguments:
@@ -386,10 +406,8 @@ def _checking(function: Callable[P, R], owner: str | None) -> Callable[P, R]:
 
     @functools.wraps(function)
     def wrapper(*values: P.args, **options: P.kwargs) -> R:
-        makes = function.__name__ == "__init__"
-        name = type(values[0]).__name__ if makes else function.__name__
-        taken = arguments(name)
-        by_place, by_name = taken.split(taken.bind(values[bound:], options))
+        taken = arguments(type(values[0]).__name__ if makes else function.__name__)
+        by_place, by_name = taken.given(values[bound:], options)
         return function(*values[:bound], *by_place, **by_name)  # type: ignore[call-arg]
 
     return readable(wrapper)

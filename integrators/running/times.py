@@ -1,5 +1,8 @@
 """Times asked for, as whole steps and parts of a step."""
 
+import math
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -34,17 +37,53 @@ def plan(times: Array, bases: Array, h: float) -> tuple[Counts, Array]:
     problems.errors.InputError
         If h is so small that the steps cannot be counted.
     """
-    count = np.rint((times - bases) / h)
-    if count.size and count.max() > COUNTABLE:
-        raise InputError(f"h={abs(h)!r} would need {count.max():.1e} steps; take a larger h.")
+    if times.size == 1:  # in a tenth of the time
+        count, part = _split(times.item(), bases.item(), h, _OfOne)
+        return np.array([int(count)]), np.array([part])
+    counts, parts = _split(times, bases, h, _OfMany)
+    return counts.astype(np.int64), parts
+
+
+class _OfMany:
+    """What `_split` does with arrays."""
+
+    rint, spacing, maximum, where = np.rint, np.spacing, np.maximum, np.where
+
+    @staticmethod
+    def largest(counts: Array) -> float:
+        return float(counts.max(initial=0.0))
+
+
+class _OfOne:
+    """The same with one number."""
+
+    spacing, maximum, largest = math.ulp, max, float
+
+    @staticmethod
+    def rint(x: float) -> float:
+        return float(round(x)) if abs(x) < COUNTABLE else x
+
+    @staticmethod
+    def where(condition: bool, yes: float, no: float) -> float:
+        return yes if condition else no
+
+
+def _check(count: float, h: float) -> None:
+    if count > COUNTABLE:
+        raise InputError(f"h={abs(h)!r} would need {count:.1e} steps; take a larger h.")
+
+
+def _split(times: Any, bases: Any, h: float, of: Any) -> tuple[Any, Any]:
+    """Return counts and parts of numbers or of arrays, with the functions ``of`` them."""
+    count = of.rint((times - bases) / h)
+    _check(of.largest(count), h)
     parts = _rest(times, bases, count, h)
-    close = np.abs(parts) <= 4.0 * np.spacing(np.maximum(np.abs(times), np.abs(bases)))
-    count = np.where(~close & (parts * h < 0.0), count - 1.0, count)
-    parts = np.where(close, 0.0, _rest(times, bases, count, h))
-    return count.astype(np.int64), parts
+    close = abs(parts) <= 4.0 * of.spacing(of.maximum(abs(times), abs(bases)))
+    count = of.where(close | (parts * h >= 0.0), count, count - 1.0)
+    return count, of.where(close, 0.0, _rest(times, bases, count, h))
 
 
-def _rest(times: Array, bases: Array, count: Array, h: float) -> Array:
+def _rest(times: Any, bases: Any, count: Any, h: float) -> Any:
     """Return times - bases - count * h, rounded once (Dekker's sum and product)."""
     gap = times - bases
     back = gap - times

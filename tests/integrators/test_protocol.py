@@ -182,6 +182,23 @@ def test_times_split_into_whole_steps_and_a_part_without_rounding(t0, h, sign, n
         assert 0 < parts[0] * sign < h + close
 
 
+@given(
+    st.floats(-1e3, 1e3),
+    st.sampled_from([0.1, -0.1, 1 / 3, -2.5, 1e-5]),
+    st.integers(0, 10**6),
+    st.integers(-6, 6),
+    st.floats(0.0, 1.0),
+)
+def test_one_time_is_split_as_one_of_many(t0, h, n, ulps, fraction):
+    time = t0 + n * h + fraction * h * (ulps > 4)
+    time += ulps * float(np.spacing(time))
+    alone = plan(np.array([time]), np.array([t0]), h)
+    among = plan(np.array([time, time]), np.array([t0, t0]), h)
+    for one, many in zip(alone, among, strict=True):
+        assert one.dtype == many.dtype
+        assert one.tobytes() == many[:1].tobytes()
+
+
 def test_multiples_of_the_step_are_its_steps_however_they_were_rounded():
     for h in (0.1, 0.3, 1 / 3, 0.7):
         times = np.arange(1, 100001) * h
