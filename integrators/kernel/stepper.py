@@ -497,7 +497,7 @@ class HBVMStepper(ABC):
 
     def _fill(self, between: int, times: Array, *steps_and_parts: NDArray[Any]) -> Made:
         """Make samples, in chunks so that Ctrl-C is heard between them."""
-        times, *given = [np.ascontiguousarray(each) for each in (times, *steps_and_parts)]
+        times, given = np.ascontiguousarray(times), [np.ascontiguousarray(part) for part in steps_and_parts]
         addresses = [address(array) for array in given]
         out = np.empty((times.size, self._dim))
         if self._vectors:

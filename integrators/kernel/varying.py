@@ -54,13 +54,14 @@ class AdaptiveStepper(HBVMStepper):
     """
 
     _program: VaryingProgram
+    _given: Array | None = None  # sizes to take where they are asked for, of one that looks ahead
+    _reached: Array | None = None  # times and sizes that it has seen
 
     def __init__(self, program: VaryingProgram, y: Array, par: Array, t0: float):
         self._breakpoints = program.breakpoints(par)
         self._max_steps = program.max_steps
         self._origin = self._goal = t0
-        self._reached, self._in_vain = np.empty((0, 1 + y.size)), 1
-        self._given: Array | None = None  # sizes to take where they are asked for, of one that looks ahead
+        self._in_vain = 1
         super().__init__(program, y, par, t0)
         if any(map(self._is_at, self._breakpoints.tolist())):
             self._context.kinks.border = START
@@ -212,7 +213,8 @@ class AdaptiveStepper(HBVMStepper):
 
     def _expected(self, ahead: float) -> Array:
         """Return the sizes that errors of the blocks may be relative to."""
-        known = self._reached[ahead * (self._reached[:, 0] - self.t) >= 0.0]
+        reached = np.empty((0, 1 + self._dim)) if self._reached is None else self._reached
+        known = reached[ahead * (reached[:, 0] - self.t) >= 0.0]
         if not len(known) and ahead * (self._goal - self.t) > 0.0:
             scout = self._scout(self.y)
             scout.only_looks()

@@ -153,7 +153,7 @@ def integrate(
     grid = _grid(problem, times)
     wanted = wanted_events(events, sample)
     end = float(check_times(grid, problem.t0)[-1]) if grid.size or wanted else problem.t0
-    acting = any(event.then is not None for event in wanted.values())
+    acting = bool(wanted) and any(event.then is not None for event in wanted.values())
     if acting and variations is not None:
         raise InputError("variations do not go on past an event with then=; leave out one of them.")
     begin = None
@@ -218,7 +218,7 @@ def integrate(
                     lows.append(stepper.low)
                 made += count if sample == "steps" else samples.t.size
             if watch is not None:
-                stats = replace(stepper.stats) if before is None else both(before, stepper.stats)
+                stats = stepper.stats.copy() if before is None else both(before, stepper.stats)
                 if watch.due and samples.t.size and sample != "dense" and not acting:
                     lost = _lost(problem, method, samples, stats.steps) | lost
                 if watch.keeps:
@@ -247,7 +247,7 @@ def integrate(
     error = stepper.error if status is Status.USER_ERROR and offers(stepper, KeptError) else None
     if error is not None and stepper.t == problem.t0:  # nothing is reached that could be kept
         raise error
-    stats = replace(stepper.stats) if before is None else both(before, stepper.stats)
+    stats = stepper.stats.copy() if before is None else both(before, stepper.stats)
     if isinstance(problem.system, Foreign):
         stats.extra = {**stats.extra, "field": problem.system.written}
     if watch is not None and watch.failure:
@@ -342,7 +342,7 @@ def _next_piece(
     the next sample. So pieces give the bits of one call of ``advance``.
     """
     sign = 1.0 if grid[-1] >= here else -1.0
-    if length == np.inf:
+    if length == np.inf or (made == grid.size - 1 and sample != "steps" and not by_steps):
         return grid[made:], sample, grid.size - made
     goal = here + sign * length
     count = int(np.count_nonzero(sign * (grid[made:] - goal) <= 0.0))

@@ -7,7 +7,7 @@ import os
 import pickle
 import sys
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from importlib import import_module
 from math import isfinite
 from pathlib import Path
@@ -225,7 +225,7 @@ READERS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {
 
 def both(before: Stats, now: Stats) -> Stats:
     """Return the counters of all the work, that before a break and that since."""
-    total = replace(now)
+    total = now.copy()
     if not before.steps:
         return total
     for name in ("steps", "rejections", "evaluations", "iterations"):

@@ -61,10 +61,13 @@ class Crawl:
         Where it is and where it shall go.
     """
 
+    _count = _total = _seen = 0
+    _way = _size = _share = 0.0
+    _look = FIRST_LOOK
+
     def __init__(self, t: float, end: float):
-        self._start, self._mark, self._end, self._count = t, t, end, 0
-        self._total, self._looked, self._way, self._size, self._seen = 0, t, 0.0, 0.0, 0
-        self._look, self._share = FIRST_LOOK, 0.0
+        self._start = self._mark = self._looked = t
+        self._end = end
 
     @property
     def patience(self) -> int:

@@ -37,10 +37,10 @@ def calls(work):
 @pytest.mark.parametrize(
     ("method", "most"),
     [
-        (HBVM(), 121),  # 118; 164 where each number read from memory was a call; 409 where all was made anew
-        (HBVM(k=8, s=4, h=0.1), 114),  # 111; 328
-        (Gauss(s=4, h=0.1), 114),  # 111; 327
-        (("Taylor", {}), 87),  # 84; 250
+        (HBVM(), 107),  # 104; 409 where all was made anew
+        (HBVM(k=8, s=4, h=0.1), 103),  # 100; 328
+        (Gauss(s=4, h=0.1), 103),  # 100; 327
+        (("Taylor", {}), 83),  # 80; 250
     ],
     ids=["HBVM", "fixed steps", "Gauss", "Taylor"],
 )
