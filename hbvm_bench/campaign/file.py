@@ -81,9 +81,9 @@ class Campaign(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             missing = "methods" if self.problems else "problems"
             raise InputError(f"campaign {self.name!r} has no {missing}; give at least one.")
         known = {name_of(entry) for entry in self.entries()}
-        many = {name_of(one.entry) for one in self.ensembles}
+        many = {name_of(item.entry) for item in self.ensembles}
         for entries, there in ((self.methods, known), (self.goals, known | many)):
-            for name in (name for one in entries for name in one.only):
+            for name in (name for item in entries for name in item.only):
                 if name not in there:
                     raise unknown("problem of the campaign", name, there)
 
@@ -102,7 +102,7 @@ class Campaign(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             If a placeholder has no value, or a value no placeholder; for too many cases.
         """
         limits.check(f"campaign {self.name!r}", "CASES", self._count(), "give fewer values to its sweeps")
-        made = [
+        cases = [
             Case(
                 problem=fill(entry.use, values),
                 method=text,
@@ -116,7 +116,7 @@ class Campaign(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             for method in self.methods
             for text in _settings(method, name_of(entry), values, self.quick)
         ]
-        return made + [
+        return cases + [
             Case(
                 problem=entry.problem,
                 method=text,
@@ -171,8 +171,8 @@ def _settings(method: MethodEntry, problem: str, values: Mapping[str, Scalar], q
     for text in method.texts:
         _all_used(text, method.sweep)
     swept = list(combinations(method.sweep))
-    made = [fill(text, {**values, **one}) for text in method.texts for one in swept]
-    return [made[place] for place in method.quick] if quick and method.quick else made
+    settings = [fill(text, {**values, **values_}) for text in method.texts for values_ in swept]
+    return [settings[place] for place in method.quick] if quick and method.quick else settings
 
 
 def _all_used(text: str, sweep: Mapping[str, object]) -> None:
@@ -261,8 +261,8 @@ def parse(text: str, source: str = "campaign") -> Campaign:
     try:
         return msgspec.convert(data, Campaign)
     except msgspec.ValidationError as error:
-        what = str(error).replace(" - at `$.", ", at `").replace(".,", ",").rstrip(".")
-        raise InputError(f"{source}: {what}.") from None
+        message = str(error).replace(" - at `$.", ", at `").replace(".,", ",").rstrip(".")
+        raise InputError(f"{source}: {message}.") from None
 
 
 def _check_keys(data: dict[str, Any], struct: type[msgspec.Struct], source: str) -> None:

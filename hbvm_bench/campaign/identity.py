@@ -223,14 +223,14 @@ def sources(modules: Iterable[str]) -> dict[str, str]:
     """Return the digests of modules, and of what they import of our packages and theirs, by name."""
     left = list(modules)
     packages = {*OWN_PACKAGES, *(name.partition(".")[0] for name in left)}
-    found: dict[str, str] = {}
+    digests: dict[str, str] = {}
     while left:
         name = left.pop()
-        if name in found or name.startswith(BOOKKEEPING) or (path := _file_of(name)) is None:
+        if name in digests or name.startswith(BOOKKEEPING) or (path := _file_of(name)) is None:
             continue
-        found[name], imported = _read(name, path)
+        digests[name], imported = _read(name, path)
         left += [other for other in imported if other.partition(".")[0] in packages]
-    return found
+    return digests
 
 
 @cache
@@ -264,9 +264,9 @@ def _read(module: str, path: Path) -> tuple[str, list[str]]:
             body[:] = [part for part in body if not _is_text(part)]
         if isinstance(node, ast.FunctionDef):  # what a problem says of itself is words too
             node.decorator_list = [part for part in node.decorator_list if _called(part) != "entry"]
-    made = hashlib.sha256(ast.dump(tree, annotate_fields=False).encode()).hexdigest(), sorted(imported)
-    kept.put(key, json.dumps(made).encode())
-    return made
+    result = hashlib.sha256(ast.dump(tree, annotate_fields=False).encode()).hexdigest(), sorted(imported)
+    kept.put(key, json.dumps(result).encode())
+    return result
 
 
 def _is_text(node: ast.AST) -> bool:
@@ -280,18 +280,18 @@ def _called(node: ast.expr) -> str:
 
 def _imported(tree: ast.Module, package: str) -> set[str]:
     """Return the modules, and what may be modules, that the imports of a file in a package name."""
-    found: set[str] = set()
+    names: set[str] = set()
     left: list[Any] = [tree]
     while left:
         node = left.pop()
         if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
+            names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
             above = package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
             origin = ".".join([*above, *([node.module] if node.module else [])])
-            found |= {origin} | {f"{origin}.{alias.name}" for alias in node.names}
+            names |= {origin} | {f"{origin}.{alias.name}" for alias in node.names}
         elif not (isinstance(node, ast.If) and getattr(node.test, "id", "") == "TYPE_CHECKING"):
             for blocks in ("body", "orelse", "finalbody", "handlers", "cases"):  # statements only: quick
                 block = getattr(node, blocks, ())
                 left += block if isinstance(block, list) else ()
-    return found
+    return names

@@ -47,7 +47,7 @@ class _Place(NamedTuple):
     function: str
 
     @classmethod
-    def of(cls, spec: Spec) -> "_Place":
+    def from_spec(cls, spec: Spec) -> "_Place":
         file, _, function = spec.name.rpartition(":")
         name, _, digest = (file, "", "") if file.endswith(".py") else file.rpartition(KEPT)
         return cls(name, digest, function)
@@ -73,7 +73,7 @@ def beside(problem: Problem) -> Beside:
     return Beside(formula=formula(repr(problem)), reference=solutions.made_here(problem))
 
 
-def learn(known: Beside) -> None:
+def add_known(known: Beside) -> None:
     """Know what another process knew of a problem.
 
     Raises
@@ -82,9 +82,9 @@ def learn(known: Beside) -> None:
         If it is damaged.
     """
     if known.formula:
-        _know(known.formula)
+        _add_formula(known.formula)
     if known.reference:
-        solutions.know(known.reference)
+        solutions.add_known(known.reference)
 
 
 def formula(text: str) -> str:
@@ -100,7 +100,7 @@ def find(spec: Spec) -> Problem | None:
     problems.errors.InputError
         If they are not known: no code is run for it.
     """
-    place = _Place.of(spec)
+    place = _Place.from_spec(spec)
     if not place.file:
         return None
     if text := formula(str(spec)):
@@ -138,7 +138,9 @@ def opened(campaign: Campaign, folder: Path | None, tell: Callable[[str], None])
         As of `read`, and for a problem that is no formula.
     """
     files = _Files(folder)
-    texts = [text_of(entry) for entry in campaign.entries()] + [one.problem for one in campaign.ensembles]
+    texts = [text_of(entry) for entry in campaign.entries()] + [
+        ensemble.problem for ensemble in campaign.ensembles
+    ]
     asked = dict.fromkeys(file_of(text) for text in texts if is_file(text))
     for file in asked:
         files.path(file)
@@ -147,10 +149,10 @@ def opened(campaign: Campaign, folder: Path | None, tell: Callable[[str], None])
         return campaign
     return replace(
         campaign,
-        problems=[one for entry in campaign.entries() for one in _kept(entry, files)],
+        problems=[ensemble for entry in campaign.entries() for ensemble in _kept(entry, files)],
         ensembles=[
-            replace(one, problem=files.kept(one.problem)) if is_file(one.problem) else one
-            for one in campaign.ensembles
+            replace(ensemble, problem=files.kept(ensemble.problem)) if is_file(ensemble.problem) else ensemble
+            for ensemble in campaign.ensembles
         ],
     )
 
@@ -175,25 +177,25 @@ class _Files:
     def kept(self, text: str) -> str:
         """Return what the problem of a file is called once its formula is known here."""
         spec = parse_spec(text)
-        problem, place = self.problem(spec), _Place.of(spec)
+        problem, place = self.problem(spec), _Place.from_spec(spec)
         if not problem.system.traced:
             raise InputError(
                 f"{spec} is no formula but a function that is called; a run keeps problems as formulas: "
                 "write it as a problems.VectorField or a problems.Hamiltonian."
             )
         named = _titled(problem, f"{place.file}{KEPT}{_digest(problem)}:{place.function}", spec.arguments)
-        _know(_packed(named))
+        _add_formula(_packed(named))
         return repr(named)
 
     def problem(self, spec: Spec) -> Problem:
         """Return the problem that a file gives."""
-        place = _Place.of(spec)
+        place = _Place.from_spec(spec)
         path = self.path(place.file)
         with _importing_from(path.parent):
             if path not in self.modules:
                 self.modules[path] = _module(path, place.file)
-            made = _called(spec, place, self.modules[path])
-        return _titled(made, f"{place.file}:{place.function}", spec.arguments)
+            problem = _called(spec, place, self.modules[path])
+        return _titled(problem, f"{place.file}:{place.function}", spec.arguments)
 
     def path(self, file: str) -> Path:
         """Return where a file lies, if it may be run."""
@@ -246,32 +248,36 @@ def _module(path: Path, file: str) -> ModuleType:
 
 def _called(spec: Spec, place: _Place, module: ModuleType) -> Problem:
     """Return what a name of a module is or, as a function, gives."""
-    what = f"{place.file}:{place.function}"
+    place_name = f"{place.file}:{place.function}"
     if not hasattr(module, place.function) or place.function.startswith("_"):
         named = vars(module).items()
-        known = {key for key, one in named if isinstance(one, Problem) or _is_function(one, module)}
+        known = {key for key, item in named if isinstance(item, Problem) or _is_function(item, module)}
         raise unknown(f"problem of {place.file}", place.function, known)
-    made = getattr(module, place.function)
-    if isinstance(made, Problem):
+    target = getattr(module, place.function)
+    if isinstance(target, Problem):
         if spec.arguments:
-            raise InputError(f"{what} is a problem and takes no arguments; write {what}.")
-        return made
-    if not callable(made):
-        raise InputError(f"{what} is {shown(made)}, neither a problem nor a function that returns one.")
-    if not hasattr(made, "entry"):  # which checks its own
+            raise InputError(f"{place_name} is a problem and takes no arguments; write {place_name}.")
+        return target
+    if not callable(target):
+        raise InputError(
+            f"{place_name} is {shown(target)}, neither a problem nor a function that returns one."
+        )
+    if not hasattr(target, "entry"):  # which checks its own
         try:
-            signature = inspect.signature(made)
+            signature = inspect.signature(target)
         except (TypeError, ValueError):
-            raise InputError(f"{what} does not tell its arguments; wrap it in a function of yours.") from None
+            raise InputError(
+                f"{place_name} does not tell its arguments; wrap it in a function of yours."
+            ) from None
         if not any(
-            one.kind in (one.VAR_POSITIONAL, one.VAR_KEYWORD) for one in signature.parameters.values()
+            item.kind in (item.VAR_POSITIONAL, item.VAR_KEYWORD) for item in signature.parameters.values()
         ):
-            Arguments(what, signature).check_names((), spec.arguments)
+            Arguments(place_name, signature).check_names((), spec.arguments)
     with _one_sentence(Path(str(module.__file__)), f"{spec} cannot be made"):
-        found = made(**spec.arguments)
-    if not isinstance(found, Problem):
-        raise InputError(f"{what} returns {shown(found)}, not a problems.Problem.")
-    return found
+        problem = target(**spec.arguments)
+    if not isinstance(problem, Problem):
+        raise InputError(f"{place_name} returns {shown(problem)}, not a problems.Problem.")
+    return problem
 
 
 def _is_function(value: object, module: ModuleType) -> bool:
@@ -279,19 +285,19 @@ def _is_function(value: object, module: ModuleType) -> bool:
 
 
 @contextmanager
-def _one_sentence(path: Path, what: str) -> Iterator[None]:
+def _one_sentence(path: Path, start: str) -> Iterator[None]:
     """Tell in one sentence, with the line of the file, whatever a user's code raises."""
     try:
         yield
     except InputError as error:
-        raise InputError(f"{what}: {error}") from error
+        raise InputError(f"{start}: {error}") from error
     except (Exception, SystemExit) as error:
         frames = traceback.extract_tb(error.__traceback__)
         lines = [frame.lineno for frame in frames if frame.filename == str(path)]
         line = error.lineno if isinstance(error, SyntaxError) else lines[-1] if lines else None
         words = error.msg if isinstance(error, SyntaxError) else " ".join(str(error).split()).rstrip(".")
         where = "" if line is None else f" in line {line}"
-        raise InputError(f"{what}, {type(error).__name__}{where}: {words or 'no message'}.") from error
+        raise InputError(f"{start}, {type(error).__name__}{where}: {words or 'no message'}.") from error
 
 
 def _titled(problem: Problem, name: str, arguments: Mapping[str, Any]) -> Problem:
@@ -307,7 +313,7 @@ def _titled(problem: Problem, name: str, arguments: Mapping[str, Any]) -> Proble
 
 def _digest(problem: Problem) -> str:
     """Return some digits of the SHA-256 of all that numbers depend on: no titles, notes or comments."""
-    arrays = [None if one is None else one.tolist() for one in (problem.y0, problem.par, problem.times)]
+    arrays = [None if array is None else array.tolist() for array in (problem.y0, problem.par, problem.times)]
     whole = [type(problem.system).__name__, problem.system.__getstate__(), arrays, problem.t0, problem.t_end]
     return hashlib.sha256(json.dumps(whole, sort_keys=True).encode()).hexdigest()[:DIGITS]
 
@@ -320,13 +326,13 @@ def _packed(problem: Problem) -> str:
 
 def _unpacked(text: str) -> Problem:
     plain = json.loads(text)
-    found = unpacked_problem(plain["problem"], {name: np.array(a) for name, a in plain["arrays"].items()})
-    assert found is not None
-    return found
+    problem = unpacked_problem(plain["problem"], {name: np.array(a) for name, a in plain["arrays"].items()})
+    assert problem is not None
+    return problem
 
 
-def _know(text: str) -> None:
+def _add_formula(text: str) -> None:
     problem = _unpacked(text)
-    if _Place.of(parse_spec(repr(problem))).digest != _digest(problem):
+    if _Place.from_spec(parse_spec(repr(problem))).digest != _digest(problem):
         raise ValueError("a problem is not the one that its name says")
     _formulas[repr(problem)] = text

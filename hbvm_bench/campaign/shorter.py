@@ -38,8 +38,8 @@ def chosen(campaign: Campaign, names: list[str]) -> Campaign:
     here = {name_of(entry) for entry in kept}
 
     def of_these(entries: Sequence[T]) -> list[T]:
-        found = ((one, [name for name in one.only if name in here]) for one in entries)
-        return [replace(one, only=only) for one, only in found if only or not one.only]
+        pairs = ((entry, [name for name in entry.only if name in here]) for entry in entries)
+        return [replace(entry, only=only) for entry, only in pairs if only or not entry.only]
 
     return replace(
         campaign, problems=kept, methods=of_these(campaign.methods), goals=of_these(campaign.goals)
@@ -65,7 +65,10 @@ def quick_run(campaign: Campaign) -> Campaign:
     short = replace(
         campaign,
         problems=[_shortened(entry) for entry in campaign.entries()],
-        ensembles=[replace(one, count=max(1, int(QUICK_SHARE * one.count))) for one in campaign.ensembles],
+        ensembles=[
+            replace(ensemble, count=max(1, int(QUICK_SHARE * ensemble.count)))
+            for ensemble in campaign.ensembles
+        ],
         quick=True,
     )
     return with_rounds(short, min(campaign.timing.rounds, QUICK_ROUNDS))

@@ -66,9 +66,9 @@ def parse_spec(text: str) -> Spec:
     """
     if len(text) > LONGEST:
         raise InputError(f"a specification of {len(text)} characters is too long; at most {LONGEST}.")
-    if (found := _FILE.match(text) or _STUDY.match(text)) is not None:
-        call = parse_spec(text[found.end() :])
-        return Spec(f"{found['file']}:{call.name}", call.arguments)
+    if (match := _FILE.match(text) or _STUDY.match(text)) is not None:
+        call = parse_spec(text[match.end() :])
+        return Spec(f"{match['file']}:{call.name}", call.arguments)
     line = "".join(" " if character.isspace() else character for character in text)  # columns stay
     if not line.strip():
         raise InputError('an empty specification; write a name or a call such as "HBVM(k=4, s=2, h=0.1)".')
@@ -99,8 +99,8 @@ def parse_spec(text: str) -> Spec:
 
 def file_of(text: str) -> str:
     """Return the Python file that a specification names, ``""`` where it names none."""
-    found = _FILE.match(text)
-    return "" if found is None else found["file"]
+    match = _FILE.match(text)
+    return "" if match is None else match["file"]
 
 
 def _literal(line: str, node: ast.expr, depth: int) -> Any:
@@ -128,14 +128,14 @@ def _finite(line: str, node: ast.expr, number: float) -> float:
     return number
 
 
-def _at(line: str, node: ast.expr | ast.keyword, what: str) -> InputError:
+def _at(line: str, node: ast.expr | ast.keyword, reason: str) -> InputError:
     # ast counts columns in UTF-8 bytes of the stripped text; a user counts characters of the whole
     margin = len(line) - len(line.lstrip())
     before = line.strip().encode()[: node.col_offset].decode(errors="ignore")
-    return _refused(line, margin + len(before) + 1, what)
+    return _refused(line, margin + len(before) + 1, reason)
 
 
-def _refused(line: str, column: int, what: str) -> InputError:
+def _refused(line: str, column: int, reason: str) -> InputError:
     shown = " ".join(line.split())
     shown = shown if len(shown) <= 120 else shown[:117] + "..."
-    return InputError(f"cannot read {shown!r}: {what} (column {column}).")
+    return InputError(f"cannot read {shown!r}: {reason} (column {column}).")

@@ -23,12 +23,12 @@ def inspect(
     as_json: Annotated[bool, typer.Option("--json", help="JSON output.")] = False,
 ) -> None:
     """Analyse a Hamiltonian: degree, exact k, separability, cyclic coordinates, engines."""
-    found = findings.inspect(system, parameters)
+    result = findings.inspect(system, parameters)
     if as_json:
-        terminal.print_json(asdict(found))
+        terminal.print_json(asdict(result))
         return
     table = Grid.grid(padding=(0, 2))
-    for heading, sentence in findings.lines(found):
+    for heading, sentence in findings.lines(result):
         table.add_row(Text(heading, style="bold"), Text(sentence))
     terminal.console().print(table)
 
@@ -70,19 +70,21 @@ def advise(
                 "until": advice.until,
                 "horizon": advice.horizon,
                 "why": advice.why,
-                "proposals": [{**vars(one), "method": repr(one.method)} for one in advice.proposals],
+                "proposals": [
+                    {**vars(proposal), "method": repr(proposal.method)} for proposal in advice.proposals
+                ],
             }
         )
         return
     rows = [
         (
-            repr(one.method),
-            f"{one.position:.1e}",
-            "" if one.energy is None else f"{one.energy:.1e}",
-            f"{one.seconds:.2g}",
-            f"{one.steps:,}",
+            repr(proposal.method),
+            f"{proposal.position:.1e}",
+            "" if proposal.energy is None else f"{proposal.energy:.1e}",
+            f"{proposal.seconds:.2g}",
+            f"{proposal.steps:,}",
         )
-        for one in advice.proposals
+        for proposal in advice.proposals
     ]
     head = ("method", "position", "energy", "seconds", "steps")
     terminal.print_table(Table(f"{advice.problem!r}, accuracy {accuracy:g}", head, rows))

@@ -96,13 +96,13 @@ def _options(
 
 @app.command("list")
 def list_(
-    what: Annotated[
+    kind: Annotated[
         str, typer.Argument(help="problems, methods, metrics or campaigns; all by default.")
     ] = "",
 ) -> None:
     """List the problems, the methods with their options, the metrics and the campaigns."""
     terminal_ = terminal.console()
-    for table in listing.tables(what):
+    for table in listing.tables(kind):
         terminal_.print(table)
 
 
@@ -158,12 +158,12 @@ def reference(
 
     from hbvm_bench.reference import solutions, trusted
 
-    made = typed_problem(problem)
+    loaded = typed_problem(problem)
     if out is not None:
         ensure_writable(out.parent)
-    stored = solutions.find_file(made)
+    stored = solutions.find_file(loaded)
     at = None if stored is None else np.array([float.fromhex(time) for time in stored.t])
-    fresh = trusted.make(made, until, at)
+    fresh = trusted.make(loaded, until, at)
     for key, value in fresh.provenance.items():
         print(f"{key}: {value}")
     print(f"end state: {' '.join(fresh.y[-1])}")

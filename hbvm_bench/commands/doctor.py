@@ -50,7 +50,7 @@ def doctor(
     findings = examining.examine()
     healthy = examining.healthy(findings)
     if as_json:
-        content = {key: [asdict(one) for one in group] for key, group in findings.items()}
+        content = {key: [asdict(finding) for finding in group] for key, group in findings.items()}
         terminal.print_json(content | {"healthy": healthy})
     else:
         _print(findings)
@@ -66,15 +66,15 @@ def _peers(context: typer.Context, rounds: int | None, out: Path | None, as_json
     store = carry_out(with_rounds(load(PEERS), rounds), directory, as_typed(context))
     results = report_on([store], directory / "report")
     run = results.runs[-1]
-    found = report.pairs(results, run)
+    pairs = report.pairs(results, run)
     if as_json:
         terminal.print_json(run_as_json(run.index, run.records))
     else:
-        terminal.print_table(report.table(found))
-        for one in found:
-            if one.failed:
-                print(f"{one.bench.case.method} on {one.task.problem} did not run: {one.failed}")
-    if not report.healthy(found):
+        terminal.print_table(report.table(pairs))
+        for pair in pairs:
+            if pair.failed:
+                print(f"{pair.bench.case.method} on {pair.task.problem} did not run: {pair.failed}")
+    if not report.healthy(pairs):
         raise typer.Exit(UNHEALTHY)
 
 
@@ -83,14 +83,14 @@ def _print(findings: dict[str, list[examining.Finding]]) -> None:
     for key, group in findings.items():
         console.print(Text(HEADINGS[key], style="bold"))
         table = Table.grid(padding=(0, 2))
-        for one in group:
-            words, style = MARKS[one.state]
-            found = Text(one.found)
-            if one.advice:
-                found.append(f"; {one.advice}", style="dim")
-            table.add_row("", Text(words, style=style), Text(one.what), found)
+        for finding in group:
+            words, style = MARKS[finding.state]
+            text = Text(finding.observed)
+            if finding.advice:
+                text.append(f"; {finding.advice}", style="dim")
+            table.add_row("", Text(words, style=style), Text(finding.subject), text)
         console.print(table)
-    installed, timings = (all(one.state != "bad" for one in findings[key]) for key in HEADINGS)
+    installed, timings = (all(finding.state != "bad" for finding in findings[key]) for key in HEADINGS)
     console.print(
         f"{'Nothing is missing' if installed else 'Something is missing'}; times measured here now "
         f"{'can be trusted' if timings else 'are doubtful'}."

@@ -22,7 +22,7 @@ from hbvm_bench.summaries.table import NONE
 from problems.errors import unknown
 
 
-def tables(what: str = "") -> list[Table]:
+def tables(only: str = "") -> list[Table]:
     """Return the tables that ``hbvm-bench list`` prints: one of `KINDS`, or all of them.
 
     Raises
@@ -30,16 +30,16 @@ def tables(what: str = "") -> list[Table]:
     problems.errors.UnknownNameError
         For anything else.
     """
-    if what and what not in KINDS:
-        raise unknown("list", what, KINDS)
-    return [KINDS[kind]() for kind in ([what] if what else KINDS)]
+    if only and only not in KINDS:
+        raise unknown("list", only, KINDS)
+    return [KINDS[kind]() for kind in ([only] if only else KINDS)]
 
 
 def citations(texts: Sequence[str]) -> list[str]:
     """Return the citations of methods, given by names or calls, each BibTeX entry once; of all for none."""
     names = [text.partition("(")[0].strip() for text in texts] or integrators.registry.names()
-    found = [integrators.registry.get(name).citation.strip() for name in names]
-    return list(dict.fromkeys(entry for text in found if text for entry in re.split(r"\n+(?=@)", text)))
+    texts_ = [integrators.registry.get(name).citation.strip() for name in names]
+    return list(dict.fromkeys(entry for text in texts_ if text for entry in re.split(r"\n+(?=@)", text)))
 
 
 def as_json(index: Index, records: Sequence[Record]) -> dict[str, Any]:
@@ -55,31 +55,31 @@ def as_json(index: Index, records: Sequence[Record]) -> dict[str, Any]:
 
 
 def _table(title: str, heads: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
-    made = terminal.empty(title)
+    table = terminal.empty(title)
     for i, head in enumerate(heads):
-        made.add_column(head, no_wrap=i == 0)
+        table.add_column(head, no_wrap=i == 0)
     for row in rows:
-        made.add_row(*map(Text, row))
-    return made
+        table.add_row(*map(Text, row))
+    return table
 
 
 def _problems() -> Table:
     loaded = [(name, problems.load(name)) for name in problems.names()]
     rows = [
         (
-            _call(name, one.arguments),
-            str(one.system.dim),
-            ", ".join(one.system.invariants),
-            one.title or "",
+            _call(name, problem.arguments),
+            str(problem.system.dim),
+            ", ".join(problem.system.invariants),
+            problem.title or "",
         )
-        for name, one in loaded
+        for name, problem in loaded
     ]
-    return _table("problems", ("problem", "dimension", "invariants", "what"), rows)
+    return _table("problems", ("problem", "dimension", "invariants", "description"), rows)
 
 
 def _methods() -> Table:
     rows = map(_method, integrators.registry.names())
-    return _table("methods", ("method", "library", "version", "what"), rows)
+    return _table("methods", ("method", "library", "version", "description"), rows)
 
 
 def _method(name: str) -> tuple[str, ...]:
@@ -94,13 +94,13 @@ def _method(name: str) -> tuple[str, ...]:
 
 def _metrics() -> Table:
     rows = [(m.key, m.unit or NONE, m.better or NONE, m.description) for m in METRICS.values()]
-    return _table("metrics", ("metric", "unit", "better", "what"), rows)
+    return _table("metrics", ("metric", "unit", "better", "description"), rows)
 
 
 def _campaigns() -> Table:
     loaded = [(name, load(name)) for name in shipped()]
     rows = [(name, str(len(campaign.cases())), campaign.title) for name, campaign in loaded]
-    return _table("campaigns", ("campaign", "cases", "what"), rows)
+    return _table("campaigns", ("campaign", "cases", "description"), rows)
 
 
 def _call(name: str, arguments: Mapping[str, Any]) -> str:

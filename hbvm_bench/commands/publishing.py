@@ -31,8 +31,8 @@ def report_on(
     if len(stores) == 1 and isinstance(stores[0], Store) and stores[0].index().campaign.page.by_processor:
         together = joined(stores[0], directory / archive.NAME)
     results = gather(together)
-    made = page_of(results)
-    publish(made, directory, contents(made, together), stderr=stderr)
+    document = page_of(results)
+    publish(document, directory, contents(document, together), stderr=stderr)
     return results
 
 

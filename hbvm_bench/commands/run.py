@@ -128,8 +128,11 @@ def as_typed(context: typer.Context) -> str:
             words.append((option.opts if given else option.secondary_opts)[-1])
         elif not (isinstance(given, Path) and given.is_absolute()):
             name = [] if option.param_type_name == "argument" else [option.opts[-1]]
-            for one in given if isinstance(given, list | tuple) else [given]:
-                words += [*name, str(one).removesuffix(".0") if isinstance(one, float) else _near(str(one))]
+            for value in given if isinstance(given, list | tuple) else [given]:
+                words += [
+                    *name,
+                    str(value).removesuffix(".0") if isinstance(value, float) else _near(str(value)),
+                ]
     return shlex.join(words)
 
 
@@ -167,7 +170,7 @@ def carry_out(
         With 130 after Ctrl-C, and 1 if an executor lost some cases; what finished is kept.
     """
     store = Store(directory)
-    store.learn()
+    store.add_known()
     cases = loop.plan(campaign)
     if whole:
         checked.check(campaign, cases)
@@ -197,13 +200,13 @@ def dated(campaign: Campaign, store: Store) -> Campaign:
 
     A goal that the run had before keeps its dates, whatever its words are now; another goal is new.
     """
-    had = {_undated(one): one for one in store.goals()}
-    new = {_undated(one): one for one in campaign.goals if _undated(one) not in had}
+    had = {_undated(declared): declared for declared in store.goals()}
+    new = {_undated(declared): declared for declared in campaign.goals if _undated(declared) not in had}
     now = datetime.now(UTC).isoformat(timespec="seconds")
-    ended = [one.finished for one in store.everything() if one.finished] if new else []
+    ended = [declared.finished for declared in store.everything() if declared.finished] if new else []
     first = min(ended, default="")
-    for key, one in new.items():
-        had[key] = replace(one, declared=one.declared or now, measured=one.measured or first)
+    for key, declared in new.items():
+        had[key] = replace(declared, declared=declared.declared or now, measured=declared.measured or first)
     return replace(campaign, goals=[had[_undated(goal)] for goal in campaign.goals])
 
 

@@ -30,47 +30,50 @@ def compare(
 
     Exit code 0 when nothing did, 1 when something did or a case is missing in one of them.
     """
-    found = comparing.compare(Store(first), Store(second))
+    comparison = comparing.compare(Store(first), Store(second))
     if as_json:
-        terminal.print_json(asdict(found))
+        terminal.print_json(asdict(comparison))
     else:
-        _print(found, terminal.console(), str(first), str(second))
-    if not found.unchanged:
+        _print(comparison, terminal.console(), str(first), str(second))
+    if not comparison.unchanged:
         raise typer.Exit(CHANGED)
 
 
-def _print(found: comparing.Comparison, console: Console, first: str, second: str) -> None:
-    for where, names in ((first, found.only_first), (second, found.only_second)):
+def _print(comparison: comparing.Comparison, console: Console, first: str, second: str) -> None:
+    for where, names in ((first, comparison.only_first), (second, comparison.only_second)):
         for name in names:
             console.print(Text(f"only in {where}: {name}"))
-    if found.behind:
-        console.print(Text(f"reason: {'; '.join(found.behind)}"))
-    numbers = found.equal + found.rounded
-    changed = sum(change.what != "outcome" for change in found.changed)
-    endings = len(found.changed) - changed
+    if comparison.behind:
+        console.print(Text(f"reason: {'; '.join(comparison.behind)}"))
+    numbers = comparison.equal + comparison.rounded
+    changed = sum(change.quantity != "outcome" for change in comparison.changed)
+    endings = len(comparison.changed) - changed
     console.print(
-        f"numerical metrics of {found.cases} cases: {numbers + changed} compared, {found.equal} equal, "
-        f"{found.rounded} within rounding, {changed} changed; {endings} outcomes changed"
+        f"numerical metrics of {comparison.cases} cases: {numbers + changed} compared, "
+        f"{comparison.equal} equal, {comparison.rounded} within rounding, {changed} changed; "
+        f"{endings} outcomes changed"
     )
-    _table(found.changed, first, second)
-    if found.noise is not None:
-        within = found.timed - len(found.slower) - len(found.faster)
+    _table(comparison.changed, first, second)
+    if comparison.noise is not None:
+        within = comparison.timed - len(comparison.slower) - len(comparison.faster)
         console.print(
-            f"times, each divided by the calibration beside it: {found.timed} compared, {within} within "
-            f"noise (a factor of {found.noise:.2f} in a typical case), {len(found.slower)} slower, "
-            f"{len(found.faster)} faster"
+            f"times, each divided by the calibration beside it: {comparison.timed} compared, {within} within "
+            f"noise (a factor of {comparison.noise:.2f} in a typical case), {len(comparison.slower)} slower, "
+            f"{len(comparison.faster)} faster"
         )
-    _table([*found.slower, *found.faster], first, second)
-    for sentence in found.untimed:
+    _table([*comparison.slower, *comparison.faster], first, second)
+    for sentence in comparison.untimed:
         console.print(Text(f"time not compared: {sentence}"))
-    if found.unchanged:
+    if comparison.unchanged:
         console.print("no change exceeds the noise.")
 
 
 def _table(changes: Sequence[comparing.Change], first: str, second: str) -> None:
-    rows = [(one.problem, one.method, one.what, one.before, one.after) for one in changes]
+    rows = [
+        (change.problem, change.method, change.quantity, change.before, change.after) for change in changes
+    ]
     if rows:
-        head = ("problem", "method", "what", first, second)
+        head = ("problem", "method", "quantity", first, second)
         terminal.print_table(Table("", head, rows, words=range(len(head))))
 
 

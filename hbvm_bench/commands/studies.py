@@ -74,11 +74,11 @@ def race(
     store = carry_out(campaign, directory, as_typed(context))
     if not quick if compile_times is None else compile_times:
         _probe(campaign, store)
-    races = results.of(report_on([store], directory / REPORT))
+    races = results.races_of(report_on([store], directory / REPORT))
     if as_json:
         terminal.print_json(race_as_data(races))
         return
-    shown = [one for one in races if one.key in keys]
+    shown = [contest for contest in races if contest.key in keys]
     for table in [tables.headline(shown), tables.goals(shown), *map(tables.fastest, shown)]:
         if table.rows:
             terminal.print_table(table)
@@ -121,9 +121,9 @@ def _probe(campaign: Campaign, store: Store) -> None:
         ours = next(case for case in cases if row_of(case) == (OURS, FIXED))
         h = float(parse_spec(ours.method).arguments["h"])
         fresh += probe(name_of(entry), ours.problem, h, families)
-    names = {one.problem for one in fresh}
+    names = {measured.problem for measured in fresh}
     before = msgspec.convert(store.beside().get(PROBES, []), list[Probe])
-    kept = [*(one for one in before if one.problem not in names), *fresh]
+    kept = [*(measured for measured in before if measured.problem not in names), *fresh]
     write_json(store.directory / f"{PROBES}.json", kept)
 
 
@@ -173,7 +173,7 @@ def endure(
         )
     asked = endurance.campaign(span, starts or (endurance.QUICK_STARTS if quick else None), method)
     store = carry_out(asked, directory, as_typed(context))
-    result = endurance.of(report_on([store], directory / REPORT))
+    result = endurance.measured_last(report_on([store], directory / REPORT))
     if as_json:
         lines = [
             msgspec.to_builtins(line) | {"rms": {f"{year:g}": value for year, value in line.rms.items()}}

@@ -103,9 +103,9 @@ def _compiled(problem: Problem) -> None:
 
 
 def _on_lanes(problem: Problem) -> None:
-    what = "force" if problem.system.separable else "field"
-    field.build(_function(problem, what), LANES)
+    name = "force" if problem.system.separable else "field"
+    field.build(_function(problem, name), LANES)
 
 
-def _function(problem: Problem, what: str) -> Any:
-    return emit.numba(problem.system, what).py_func
+def _function(problem: Problem, name: str) -> Any:
+    return emit.numba(problem.system, name).py_func

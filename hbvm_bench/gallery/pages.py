@@ -37,26 +37,29 @@ def write(directory: Path, *, with_pictures: bool = True) -> list[Path]:
     names = [name for name, picture in drawn.items() if not picture.arguments]
     loaded = {name: problems.load(name) for name in names}
     pages = {"problems.md": [_overview(loaded), _references()], "engines.md": [_engines(names)]}
-    made = {directory / name: _filled(directory / name, pieces).encode() for name, pieces in pages.items()}
-    made |= {directory / "problems" / f"{name}.md": _page(name, one).encode() for name, one in loaded.items()}
+    files = {directory / name: _filled(directory / name, pieces).encode() for name, pieces in pages.items()}
+    files |= {
+        directory / "problems" / f"{name}.md": _page(name, problem).encode()
+        for name, problem in loaded.items()
+    }
     for name in drawn if with_pictures else ():
-        made[directory / "problems" / f"{name}.svg"] = pictures.draw(name).encode()
-    write_all(made)
-    return list(made)
+        files[directory / "problems" / f"{name}.svg"] = pictures.draw(name).encode()
+    write_all(files)
+    return list(files)
 
 
 def _filled(path: Path, pieces: Sequence[str]) -> str:
     """Return a page with new pieces between its marks; one that is not there yet has nothing else."""
-    made = [f"{BEGIN}\n\n{piece.strip()}\n\n{END}" for piece in pieces]
+    blocks = [f"{BEGIN}\n\n{piece.strip()}\n\n{END}" for piece in pieces]
     if not path.is_file():
-        return "\n\n".join(made) + "\n"
+        return "\n\n".join(blocks) + "\n"
     marked = f"(?s){re.escape(BEGIN)}.*?{re.escape(END)}"
     kept = re.split(marked, path.read_text(encoding="utf-8"))
     if len(kept) != len(pieces) + 1:
         raise InputError(
             f"{path} must have {BEGIN!r} and {END!r} around {len(pieces)} places, not {len(kept) - 1}."
         )
-    return kept[0] + "".join(piece + after for piece, after in zip(made, kept[1:], strict=True))
+    return kept[0] + "".join(piece + after for piece, after in zip(blocks, kept[1:], strict=True))
 
 
 def _engines(names: Sequence[str]) -> str:
@@ -103,29 +106,29 @@ def _page(name: str, problem: Problem) -> str:
 
 def _numpydoc(doc: str) -> dict[str, str]:
     """Split a docstring into its sections."""
-    found = {"Summary": ""}
+    sections = {"Summary": ""}
     heading = "Summary"
     lines = doc.splitlines()
     for i, line in enumerate(lines):
         below = lines[i + 1] if i + 1 < len(lines) else ""
         if line and below and set(below) == {"-"}:
             heading = line
-            found[heading] = ""
+            sections[heading] = ""
         elif not (line and set(line) == {"-"}):
-            found[heading] += line + "\n"
-    return found
+            sections[heading] += line + "\n"
+    return sections
 
 
 def _entries(section: str) -> list[tuple[str, str]]:
     """Return the (name and type, description) pairs of a section."""
-    found: list[tuple[str, str]] = []
+    entries: list[tuple[str, str]] = []
     for line in section.splitlines():
         if line and not line.startswith(" "):
-            found.append((line, ""))
-        elif line.strip() and found:
-            head, body = found[-1]
-            found[-1] = (head, f"{body} {line.strip()}".strip())
-    return [(head, _code(body)) for head, body in found]
+            entries.append((line, ""))
+        elif line.strip() and entries:
+            head, body = entries[-1]
+            entries[-1] = (head, f"{body} {line.strip()}".strip())
+    return [(head, _code(body)) for head, body in entries]
 
 
 def _flowed(block: str) -> str:

@@ -39,9 +39,9 @@ def draw(name: str) -> str:
     problem = problems.load(name, **picture.arguments)
     end = problem.t_end if picture.span is None else problem.t0 + picture.span
     times = np.linspace(problem.t0, end, picture.points)
-    found = integrators.integrate(problem, integrators.DOP853(rtol=1e-9, atol=1e-11), times=times)
-    if found.status.failed:
-        raise InputError(f"{name} cannot be drawn: {found.reason}")
+    solution = integrators.integrate(problem, integrators.DOP853(rtol=1e-9, atol=1e-11), times=times)
+    if solution.status.failed:
+        raise InputError(f"{name} cannot be drawn: {solution.reason}")
     look: dict[Any, Any] = {
         "svg.hashsalt": "hbvm-bench",  # the same file from the same numbers
         "svg.fonttype": "none",
@@ -53,7 +53,7 @@ def draw(name: str) -> str:
     }
     with plt.rc_context(look):
         figure, ax = plt.subplots(figsize=(4.2, 3.0), layout="constrained")
-        _draw(ax, picture, problem, found.t, found.y)
+        _draw(ax, picture, problem, solution.t, solution.y)
         svg = io.StringIO()
         figure.savefig(svg, format="svg", metadata={"Date": None, "Creator": None}, dpi=110)
         plt.close(figure)

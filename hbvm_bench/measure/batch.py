@@ -29,7 +29,7 @@ class Members:
     @property
     def failed(self) -> list[Status]:
         """How those ended that did not arrive."""
-        return [one for one in self.status if one is not Status.FINISHED]
+        return [status for status in self.status if status is not Status.FINISHED]
 
 
 def prepared(
@@ -65,14 +65,14 @@ def integrate(
     go = prepared(program, starts, problem, par)
     if go is not None:
         begin = clock()
-        made = go()
+        batch = go()
         spent = clock() - begin
-        counts = getattr(made, "evaluations", None)
+        counts = getattr(batch, "evaluations", None)
         return Members(
-            y=made.y[:, -1],
-            status=made.status,
-            reason=next((reason for reason in made.reason if reason), ""),
-            steps=int(made.steps.sum()),
+            y=batch.y[:, -1],
+            status=batch.status,
+            reason=next((reason for reason in batch.reason if reason), ""),
+            steps=int(batch.steps.sum()),
             evaluations=None if counts is None else int(counts.sum()),
             seconds=spent,
         )

@@ -46,9 +46,9 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stab
 class Finding:
     """One thing that was looked at."""
 
-    what: str  # in a word or two
+    subject: str  # in a word or two
     state: State  # ``note`` is good to know; ``bad`` makes the results incomplete or their times doubtful
-    found: str  # what it is
+    observed: str  # what it is
     advice: str = ""  # what to do about it; empty where there is nothing to do
 
 
@@ -63,7 +63,7 @@ def examine(*, calibration: bool = True) -> dict[str, list[Finding]]:
 
 def healthy(findings: dict[str, list[Finding]]) -> bool:
     """Whether nothing is bad."""
-    return not any(one.state == "bad" for group in findings.values() for one in group)
+    return not any(finding.state == "bad" for group in findings.values() for finding in group)
 
 
 def python() -> Finding:
@@ -74,42 +74,42 @@ def python() -> Finding:
 
 def libraries() -> list[Finding]:
     """Return for every optional library its version, or what does not work without it."""
-    found: list[Finding] = []
+    findings: list[Finding] = []
     for extra, (names, without) in EXTRAS.items():
         state: State = "bad" if extra == "peers" else "note"
         missing = f"not installed: {without}", f"pip install 'hbvm-bench[{extra}]'"
         for name in names:
             try:
-                found.append(Finding(name, "ok", version(name)))
+                findings.append(Finding(name, "ok", version(name)))
             except PackageNotFoundError:
                 absent = Finding(name, state, *missing)
                 if name in without_wheels():
                     absent = Finding(name, "note", "not installed: it has no wheels for this system")
-                found.append(absent)
-    return found
+                findings.append(absent)
+    return findings
 
 
 def methods() -> list[Finding]:
     """Return the registered methods of libraries that are no extra of ours, and those that fail to load."""
-    found: list[Finding] = []
+    findings: list[Finding] = []
     known = {"hbvm-bench", "scipy"}.union(*(names for names, _ in EXTRAS.values()))
     for name in integrators.registry.names():
         try:
             library = integrators.registry.get(name).library
         except InputError as error:
-            found.append(Finding(name, "bad", str(error)))
+            findings.append(Finding(name, "bad", str(error)))
         except Exception as error:  # a third party's module may raise anything when it is imported
             words = f"cannot be imported: {type(error).__name__}: {error}"
-            found.append(Finding(name, "bad", words, "ask its authors, or uninstall it"))
+            findings.append(Finding(name, "bad", words, "ask its authors, or uninstall it"))
         else:
             if library.lower() not in known:
-                found.append(Finding(name, "ok", f"{library} {version_of(library)}"))
-    return found
+                findings.append(Finding(name, "ok", f"{library} {version_of(library)}"))
+    return findings
 
 
 def browser() -> Finding:
     """Return whether the browser is there that the tests look at reports with."""
-    if path := next((found for name in BROWSERS if (found := shutil.which(name))), None):
+    if path := next((path_ for name in BROWSERS if (path_ := shutil.which(name))), None):
         return Finding("browser", "ok", Path(path).name)
     if find_spec("playwright") is None:
         return Finding("browser", "note", "none; only the tests of this project use one")
@@ -217,8 +217,8 @@ def steal(part: float) -> Finding:
     return _judged("steal time", words, part > LARGEST_STEAL, "use a machine of its own")
 
 
-def _judged(what: str, words: str, bad: bool, advice: str) -> Finding:
-    return Finding(what, "bad" if bad else "ok", words, advice * bad)
+def _judged(name: str, words: str, bad: bool, advice: str) -> Finding:
+    return Finding(name, "bad" if bad else "ok", words, advice * bad)
 
 
 def _quota() -> float | None:

@@ -29,7 +29,9 @@ class EnsembleRun(Timeable):
     par: Array | None = None  # parameters of each, shape (n, n_par); the problem's own by default
 
     @classmethod
-    def of(cls, problem: Problem, method: MethodBase, program: Program, asked: Ensemble) -> "EnsembleRun":
+    def compiled(
+        cls, problem: Problem, method: MethodBase, program: Program, asked: Ensemble
+    ) -> "EnsembleRun":
         """Return the run of a method, and the program it compiled, on an ensemble of a problem."""
         starts, par = members(problem, asked)
         return cls(program, starts, problem, method.to_end, par)
@@ -42,6 +44,6 @@ class EnsembleRun(Timeable):
         return replace(self, starts=self.starts[:WARM_UP], par=par, problem=problem)
 
     def once(self, clock: Callable[[], float]) -> tuple[float, Samples]:
-        made = integrate(self.program, self.starts, self.problem, self.sample, clock, self.par)
-        status = next(iter(made.failed), Status.FINISHED)
-        return made.seconds, Samples(np.array([self.problem.t_end]), made.y[:1], status)
+        members_ = integrate(self.program, self.starts, self.problem, self.sample, clock, self.par)
+        status = next(iter(members_.failed), Status.FINISHED)
+        return members_.seconds, Samples(np.array([self.problem.t_end]), members_.y[:1], status)

@@ -101,11 +101,13 @@ def sentence(described: Mapping[str, str | int]) -> str:
 def sentences(described: Iterable[Mapping[str, str | int]]) -> list[str]:
     """Say what kinds of processor times belong to, each once, with the range of its clock's readings."""
     kinds: dict[str, list[Mapping[str, str | int]]] = {}
-    for one in described:
-        kinds.setdefault(sentence({**one, "clock_ghz": ""}), []).append(one)
+    for machine_ in described:
+        kinds.setdefault(sentence({**machine_, "clock_ghz": ""}), []).append(machine_)
     said = []
     for alike in kinds.values():
-        clocks = sorted({str(one["clock_ghz"]) for one in alike if "clock_ghz" in one}, key=float)
+        clocks = sorted(
+            {str(machine_["clock_ghz"]) for machine_ in alike if "clock_ghz" in machine_}, key=float
+        )
         ends = dict.fromkeys((*clocks[:1], *clocks[-1:]))
         said.append(sentence({**alike[0], "clock_ghz": " to ".join(ends)}))
     return said

@@ -61,10 +61,10 @@ class Measured:
 
     def series(self) -> dict[str, Array]:
         """Return the arrays that figures are drawn from, and tables of series made."""
-        made = {name: getattr(self, name) for name in PLAIN}
+        arrays = {name: getattr(self, name) for name in PLAIN}
         for field_, prefix in PREFIXES.items():
-            made |= {f"{prefix}{name}": values for name, values in getattr(self, field_).items()}
-        return made
+            arrays |= {f"{prefix}{name}": values for name, values in getattr(self, field_).items()}
+        return arrays
 
 
 def measure(
@@ -81,7 +81,7 @@ def measure(
     ``reference`` is the trusted solution, where there is one; an ensemble brings its own.
     """
     t, y = series["t"], series["y"]
-    made = Measured(
+    measured = Measured(
         problem=problem,
         t=t,
         y=y,
@@ -103,11 +103,11 @@ def measure(
             "guards": {name: np.asarray(v, float) for name, v in problem.guards(y, t).items()},
         }
         if ensemble is not None:
-            return replace(made, **of_all, **_of_ensemble(problem, ensemble, series))
+            return replace(measured, **of_all, **_of_ensemble(problem, ensemble, series))
         errors = {name: np.asarray(values, float) for name, values in problem.errors(y, t).items()}
         position_t, position, phase = _position_error(problem, t, y, reference)
     return replace(
-        made,
+        measured,
         **of_all,
         errors=errors,
         position_t=position_t,
@@ -125,13 +125,13 @@ def with_laws(measured: Measured, asked: Checks) -> Measured:
         law = Law(why=f"the trajectory ends at t = {measured.t_stop:.4g}", starts=1)
         return replace(measured, laws=dict.fromkeys(measured.problem.system.invariants, law))
     rows = {name: values for name, values in measured.drift.items() if name != "t"}
-    found = {
+    laws = {
         name: drift.fit(measured.drift["t"], values, signed=name == "energy")
         if values.shape[1]
         else Law(why="no samples")
         for name, values in rows.items()
     }
-    return replace(measured, laws=found)
+    return replace(measured, laws=laws)
 
 
 def _named(series: Series, prefix: str) -> Series:
@@ -153,21 +153,21 @@ def _drift(problem: Problem, series: Series) -> Series:
     starts = [problem.y0, *series["starts.y0"]]
     states = [series["y"], *series["starts.y"]]
     each = [_signed(problem, start, series["t"], y) for start, y in zip(starts, states, strict=True)]
-    errors = {name: np.stack([one[name] for one in each])[:, t > 0.0] for name in each[0]}
+    errors = {name: np.stack([errors_[name] for errors_ in each])[:, t > 0.0] for name in each[0]}
     return {"t": t[t > 0.0], **errors} if errors else {}
 
 
 def _signed(problem: Problem, start: Array, t: Array, y: Array) -> Series:
     """Return the errors against the values at ``start``, the energy's with their sign, shape (n,) each."""
-    found: Series = {}
+    errors: Series = {}
     states = np.ascontiguousarray(np.vstack([start[None], y]).T)
     times = np.concatenate([[problem.t0], t])
     for name, function in problem.system.invariants.items():
         values = invariants.evaluate(function, times, states, problem.par)
         gaps = np.stack([(v.hi[1:] - v.hi[0]) + (v.lo[1:] - v.lo[0]) for v in values])
         size = float(np.linalg.norm([v.hi[0] for v in values])) or 1.0
-        found[name] = (gaps[0] if name == "energy" else np.linalg.norm(gaps, axis=0)) / size
-    return found
+        errors[name] = (gaps[0] if name == "energy" else np.linalg.norm(gaps, axis=0)) / size
+    return errors
 
 
 def _of_ensemble(problem: Problem, ensemble: Ensemble, series: Series) -> dict[str, Any]:

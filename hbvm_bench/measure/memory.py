@@ -37,7 +37,7 @@ class Memory:
     files: int = 0
 
 
-def of(pid: int) -> Memory:
+def of_process(pid: int) -> Memory:
     """Return the memory of a process; zeros if it has ended."""
     try:
         status = (PROCESSES / str(pid) / "status").read_text(encoding="ascii", errors="replace")
@@ -51,7 +51,7 @@ def of(pid: int) -> Memory:
 
 def own_peak() -> int:
     """Return the largest resident memory of this process in KiB."""
-    largest = of(os.getpid()).peak
+    largest = of_process(os.getpid()).peak
     if resource is None:
         return largest
     unit = 2**10 if sys.platform == "darwin" else 1  # bytes there
@@ -75,10 +75,10 @@ def _elsewhere(pid: int) -> Memory:
 def _members(leader: int) -> Iterator[psutil.Process]:
     """Yield the processes of a session, or the descendants where there are no sessions."""
     if hasattr(os, "getsid"):
-        for one in psutil.process_iter():
+        for member in psutil.process_iter():
             with contextlib.suppress(OSError):
-                if os.getsid(one.pid) == leader:
-                    yield one
+                if os.getsid(member.pid) == leader:
+                    yield member
         return
     with contextlib.suppress(psutil.Error):
         process = psutil.Process(leader)

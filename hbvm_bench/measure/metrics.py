@@ -322,12 +322,12 @@ def _of_law(m: Measured, name: str) -> float | str:
 def _compiled(m: Measured, *, cached: bool, otherwise: str) -> float | str:
     """Return the median seconds of the compilations of a kind; ``otherwise`` where there are only others."""
     rounds = m.timing.rounds if m.timing is not None else []
-    found = [one for one in (m.compile, *(r.compile for r in rounds)) if one is not None]
-    if not found:
+    compiles = [compile_ for compile_ in (m.compile, *(r.compile for r in rounds)) if compile_ is not None]
+    if not compiles:
         return LOADED
-    if all(one.cached is None for one in found):
+    if all(compile_.cached is None for compile_ in compiles):
         return "nothing is compiled at run time"
-    seconds = sorted(one.seconds for one in found if one.cached is cached)
+    seconds = sorted(compile_.seconds for compile_ in compiles if compile_.cached is cached)
     return seconds[(len(seconds) - 1) // 2] if seconds else otherwise
 
 
@@ -341,8 +341,8 @@ def _largest(values: NDArray[np.float64], t: NDArray[np.float64]) -> float | str
 
 
 def _largest_of(series: list[NDArray[np.float64]], m: Measured) -> float | str:
-    found: list[Any] = [_largest(values, m.t) for values in series]
-    return next((one for one in found if isinstance(one, str)), None) or max(found)
+    largest: list[Any] = [_largest(values, m.t) for values in series]
+    return next((value for value in largest if isinstance(value, str)), None) or max(largest)
 
 
 def _no_reference(m: Measured) -> str:

@@ -103,11 +103,11 @@ def beside(solution: Solution, program: Program, asked: Checks) -> tuple[Value, 
     problem, series = solution.problem, Series()
     way_back = Value(why="not asked for")
     if asked.reversal:
-        found = _there_and_back(problem, solution.method, program, asked.reversal)
-        if isinstance(found, str):
-            way_back = Value(why=found)
+        returned = _there_and_back(problem, solution.method, program, asked.reversal)
+        if isinstance(returned, str):
+            way_back = Value(why=returned)
         else:
-            way_back, series["reversal.y"] = Value(), found[None]
+            way_back, series["reversal.y"] = Value(), returned[None]
     if asked.starts and solution.status is Status.FINISHED:
         starts, states = [], []
         for start in scaled(problem, asked.starts)[1:]:
@@ -124,19 +124,19 @@ def beside(solution: Solution, program: Program, asked: Checks) -> tuple[Value, 
 def ensemble(problem: Problem, program: Program, asked: Ensemble) -> tuple[Result, Series]:
     """Integrate an ensemble once; its series are over the trajectories, not over time."""
     starts, par = members(problem, asked)
-    made = integrate(program, starts, problem, par=par)
-    failed = made.failed
+    batch = integrate(program, starts, problem, par=par)
+    failed = batch.failed
     index = np.unique(np.linspace(0, asked.count - 1, WITNESSES).astype(int))
     result = Result(
         outcome="stalled" if failed and failed[0] is Status.STALLED else "ok",
         status=(failed[0] if failed else Status.FINISHED).value,
-        reason=f"{len(failed)} of {asked.count} trajectories failed; {made.reason}" if failed else "",
+        reason=f"{len(failed)} of {asked.count} trajectories failed; {batch.reason}" if failed else "",
         t_stop=problem.t_end,
-        counters=Counters(steps=made.steps, evaluations=made.evaluations),
+        counters=Counters(steps=batch.steps, evaluations=batch.evaluations),
         compile=Compile(seconds=float(program.compile_seconds), cached=program.from_cache),
         trajectories=asked.count,
     )
-    series = {"t": np.full(asked.count, problem.t_end), "y": made.y}
+    series = {"t": np.full(asked.count, problem.t_end), "y": batch.y}
     return result, series | _ends(problem, index, starts[index], par[index])
 
 
@@ -148,8 +148,8 @@ def _ends(problem: Problem, index: NDArray[np.intp], starts: Array, par: Array) 
     rows: list[list[Decimal]] = []
     try:
         for start, own in zip(starts, par, strict=True):
-            one = changed(problem, start, own, problem.t_end)
-            rows.append(solutions.taylor(one, span, solutions.TOLERANCE)[-1])
+            member = changed(problem, start, own, problem.t_end)
+            rows.append(solutions.taylor(member, span, solutions.TOLERANCE)[-1])
     except InputError:  # heyoka is missing, or it does not arrive
         return {}
     high = np.array([[float(value) for value in row] for row in rows])
@@ -165,8 +165,8 @@ def _there_and_back(problem: Problem, method: MethodBase, program: Program, shar
     turn = problem.t0 + way
     y = problem.y0
     for which, begin, end in (("there", problem.t0, turn), ("back", turn, problem.t0)):
-        made = program.start(y, problem.par, begin).advance(np.array([end]))
-        if made.status is not Status.FINISHED:
-            return f"the way {which} ended as {made.status.value.replace('_', ' ')}"
-        y = made.y[-1]
+        samples = program.start(y, problem.par, begin).advance(np.array([end]))
+        if samples.status is not Status.FINISHED:
+            return f"the way {which} ended as {samples.status.value.replace('_', ' ')}"
+        y = samples.y[-1]
     return y

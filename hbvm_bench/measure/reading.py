@@ -28,8 +28,8 @@ def records(store: Store | Archive) -> list[Record]:
     problems.errors.InputError
         If the directory holds no run.
     """
-    found = store.records()
-    return found if isinstance(store, Archive) else [kept(store, record) for record in found]
+    stored = store.records()
+    return stored if isinstance(store, Archive) else [kept(store, record) for record in stored]
 
 
 def kept(store: Store, record: Record) -> Record:
@@ -42,11 +42,14 @@ def kept(store: Store, record: Record) -> Record:
     except InputError:  # of a plugin that is not here
         return record if reading is None else with_reading(record, reading)
     content = msgspec.json.encode([rule(), reference, record.id, record.finished, record.timing])
-    by = hashlib.sha256(content).hexdigest()
-    if reading is None or reading.by != by:
-        made = read(record, store.series(record.id))
+    digest = hashlib.sha256(content).hexdigest()
+    if reading is None or reading.digest != digest:
+        reread = read(record, store.series(record.id))
         reading = Reading(
-            metrics=made.result.metrics, violation=made.result.violation, laws=made.result.laws, by=by
+            metrics=reread.result.metrics,
+            violation=reread.result.violation,
+            laws=reread.result.laws,
+            digest=digest,
         )
         with suppress(InputError, OSError):  # where nothing can be written it is read again next time
             store.keep_reading(record.id, reading)
@@ -55,17 +58,19 @@ def kept(store: Store, record: Record) -> Record:
 
 def read(record: Record, series: Series) -> Record:
     """Return a record with its laws, its metrics, and whether its trajectory is another than asked for."""
-    found = of(record, series)
-    if found is None:
+    case_measured = case_of(record, series)
+    if case_measured is None:
         return record
-    found = measured.with_laws(found, record.case.checks)
+    case_measured = measured.with_laws(case_measured, record.case.checks)
     reading = Reading(
-        metrics=metrics.evaluate(found), violation=metrics.guard_violation(found), laws=found.laws
+        metrics=metrics.evaluate(case_measured),
+        violation=metrics.guard_violation(case_measured),
+        laws=case_measured.laws,
     )
     return with_reading(record, reading)
 
 
-def of(record: Record, series: Series) -> Measured | None:
+def case_of(record: Record, series: Series) -> Measured | None:
     """Return what is measured on a case, without laws; ``None`` where it has no trajectory.
 
     A case that was read by an earlier version, which kept too little to read it again, has none either.
@@ -81,8 +86,8 @@ def of(record: Record, series: Series) -> Measured | None:
 
 def drawn(record: Record, series: Series) -> Series:
     """Return the series that figures are drawn from: errors, distances and positions beside the states."""
-    found = of(record, series)
-    return series if found is None else found.series()
+    case_measured = case_of(record, series)
+    return series if case_measured is None else case_measured.series()
 
 
 def is_read(series: Series) -> bool:

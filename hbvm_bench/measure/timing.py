@@ -74,7 +74,7 @@ class Run(Timeable):
     sample: str | None  # how the end time is met; see `integrators.protocol.MethodBase.to_end`
 
     @classmethod
-    def of(cls, problem: Problem, method: MethodBase, program: Program | None = None) -> "Run":
+    def compiled(cls, problem: Problem, method: MethodBase, program: Program | None = None) -> "Run":
         """Return the run of a method, compiled if it is not yet, which meets its end as its library does."""
         program = method.compile(problem.system) if program is None else program
         return cls(program, problem.y0, problem.par, problem.t0, problem.t_end, method.to_end)
@@ -147,7 +147,7 @@ def shared(rounds: int, compilations: int) -> list[list[int]]:
     """Return the rounds of each process: those that choose are not in one with those that compare."""
     if compilations == 1:
         return [list(range(rounds))]
-    kinds = [[one for one in range(rounds) if chooses(one) is kind] for kind in (True, False)]
+    kinds = [[round_ for round_ in range(rounds) if chooses(round_) is kind] for kind in (True, False)]
     counts = compilations - compilations // 2, compilations // 2
     parts = [kind[place::count] for kind, count in zip(kinds, counts, strict=True) for place in range(count)]
     return [part for part in parts if part]
@@ -162,8 +162,8 @@ def spread_evenly(count: int, rounds: Sequence[int]) -> list[int]:
     count = max(min(2, most), min(most, count))
     chosen = [rounds[place * most // count] for place in range(count)]
     if len({*map(chooses, chosen)}) == 1 < len({*map(chooses, rounds)}):
-        both = [next(one for one in rounds if chooses(one) is kind) for kind in (True, False)]
-        chosen = sorted({*both, *(one for one in chosen[1:] if one > max(both))})[:count]
+        both = [next(round_ for round_ in rounds if chooses(round_) is kind) for kind in (True, False)]
+        chosen = sorted({*both, *(round_ for round_ in chosen[1:] if round_ > max(both))})[:count]
     return chosen
 
 
@@ -176,7 +176,7 @@ class Spread:
     high: float | None
 
     @classmethod
-    def of(cls, samples: Sequence[float]) -> "Spread":
+    def from_samples(cls, samples: Sequence[float]) -> "Spread":
         """Return the spread of samples, at least one."""
         low, high = quantiles(samples, n=4, method="inclusive")[::2] if len(samples) > 1 else (None, None)
         return cls(median(samples), low, high)
@@ -244,7 +244,7 @@ def time_together(
     mine = [[place for place, number in enumerate(rounds) if number in turns[i]] for i in fine]
     taken = interleaved(samples, len(rounds), order=plan.order, turns=mine, begin=begin)
     load = load_between(before, busy())
-    made = [_unfinished(reached) for _, reached in firsts]
+    timings = [_unfinished(reached) for _, reached in firsts]
     for i, seconds in zip(fine, taken, strict=True):
         fixed = {"repeats": repeats[i], "compile": _compilation(runs[i]), "compilation": compilation}
         taking = [
@@ -253,8 +253,8 @@ def time_together(
         ]
         few = f"{len(taking)} of {len(rounds)} rounds: a run takes {firsts[i][0]:.2g} s"
         why = few * (len(taking) < len(rounds))
-        made[i] = Timing(rounds=taking, why=why, call=calls[i], load=load)
-    return made
+        timings[i] = Timing(rounds=taking, why=why, call=calls[i], load=load)
+    return timings
 
 
 def _unfinished(reached: Samples) -> Timing:

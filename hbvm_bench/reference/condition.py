@@ -47,7 +47,9 @@ def conditions(problem: Problem, ends: Array, states: Array) -> Array | None:
         return None
     width = problem.system.bodies.dimension if problem.system.bodies is not None else problem.system.dof
     size = _lengths(states, problem.system.dof, width).max()
-    return np.array([_moved(problem, *one, width) for one in zip(ends.tolist(), states, strict=True)]) / size
+    return (
+        np.array([_moved(problem, *pair, width) for pair in zip(ends.tolist(), states, strict=True)]) / size
+    )
 
 
 def _moved(problem: Problem, end: float, state: Array, width: int) -> float:

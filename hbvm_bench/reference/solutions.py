@@ -119,27 +119,27 @@ def find(problem: Problem) -> Reference | None:
         references the one that has the problem's end time is returned, or else the first. One that
         was made here (`know`) is preferred: it has this very span and formula.
     """
-    found = find_file(problem)
-    return None if found is None else found.reference
+    file = find_file(problem)
+    return None if file is None else file.reference
 
 
 def find_file(problem: Problem) -> ReferenceFile | None:
     """Return the reference of a problem with all its digits, or ``None``; see `find`."""
-    if (known := _known.get()) and (found := known.get(_key(problem))) is not None:
-        return found
+    if (known := _known.get()) and (file := known.get(_key(problem))) is not None:
+        return file
     wanted, end = (start(problem), hexadecimal(problem.par)), float(problem.t_end).hex()
     stored = _of_name(problem.name or "")
-    fitting = [one for one in stored if (one.start, one.parameters) == wanted]
-    return next((one for one in fitting if end in one.t), fitting[0] if fitting else None)
+    fitting = [file_ for file_ in stored if (file_.start, file_.parameters) == wanted]
+    return next((file_ for file_ in fitting if end in file_.t), fitting[0] if fitting else None)
 
 
 def digest(problem: Problem) -> str:
     """Return the SHA-256 of the times and states of a problem's reference; ``""`` where it has none."""
-    found = find_file(problem)
-    return "" if found is None else found.digest
+    file = find_file(problem)
+    return "" if file is None else file.digest
 
 
-def know(text: str) -> None:
+def add_known(text: str) -> None:
     """Know a reference that does not come with the package, from its text; see `encode`.
 
     Raises
@@ -147,14 +147,14 @@ def know(text: str) -> None:
     ValueError, LookupError
         If it is none.
     """
-    found = msgspec.json.decode(text, type=ReferenceFile)
-    if len(found.reference.t) != len(found.y) or len(found.condition) not in (0, len(found.y)):
+    file = msgspec.json.decode(text, type=ReferenceFile)
+    if len(file.reference.t) != len(file.y) or len(file.condition) not in (0, len(file.y)):
         raise ValueError(
             "a reference must have one state, and no or one condition number, for each of its times"
         )
-    said = found.provenance
-    key = (*found.start, *found.parameters, said["field"], float(said["t_end"]).hex())
-    _known.set({**_known.get(), key: found})
+    said = file.provenance
+    key = (*file.start, *file.parameters, said["field"], float(said["t_end"]).hex())
+    _known.set({**_known.get(), key: file})
 
 
 def forget() -> None:
@@ -174,8 +174,8 @@ def apart() -> Iterator[None]:
 
 def made_here(problem: Problem) -> str:
     """Return the text of a problem's reference that does not come with the package; ``""`` without one."""
-    found = _known.get().get(_key(problem))
-    return "" if found is None else encode(found)
+    file = _known.get().get(_key(problem))
+    return "" if file is None else encode(file)
 
 
 # of the run that this thread works for: two runs may have two references of a problem
@@ -196,7 +196,7 @@ def _of_name(name: str) -> list[ReferenceFile]:
     return [read(path) for place in places for path in sorted(place.glob(f"{name}*.json"))]
 
 
-def of(
+def file_from(
     problem: Problem,
     times: Array,
     states: list[list[str]],
@@ -226,7 +226,9 @@ def of_end(problem: Problem, end: Sequence[float]) -> ReferenceFile:
     if len(end) != problem.system.dim or not np.isfinite(end).all():
         raise InputError(f"end={list(end)!r} of {problem!r} must be {problem.system.dim} finite numbers.")
     states = [[repr(float(value)) for value in end]]
-    return of(problem, np.array([problem.t_end]), states, {"method": "the end state that the campaign gives"})
+    return file_from(
+        problem, np.array([problem.t_end]), states, {"method": "the end state that the campaign gives"}
+    )
 
 
 def difference(stored: ReferenceFile, fresh: ReferenceFile) -> Decimal:
@@ -344,11 +346,11 @@ def _expressions(system: System, hy: Any, real: Any) -> list[Any]:
     With double literals heyoka would turn a division by 3 into a multiplication
     by the double next to 1/3, whatever the precision of the integration.
     """
-    made = emit.source(system, "field", "heyoka")
-    tree = ast.fix_missing_locations(_Numbers().visit(ast.parse(made.text)))
+    source = emit.source(system, "field", "heyoka")
+    tree = ast.fix_missing_locations(_Numbers().visit(ast.parse(source.text)))
     namespace: dict[str, Any] = {"number": lambda value: hy.expression(real(value))}
     exec(compile(tree, "<field>", "exec"), namespace)  # noqa: S102 -- emitted from a graph
     variables = [variable for variable, _ in emit.heyoka(system)]
-    found = namespace[made.name](hy.time, variables, hy.par, hy)
-    found = [e if isinstance(e, hy.expression) else hy.expression(real(e)) for e in found]
-    return list(zip(variables, found, strict=True))
+    derivatives = namespace[source.name](hy.time, variables, hy.par, hy)
+    derivatives = [e if isinstance(e, hy.expression) else hy.expression(real(e)) for e in derivatives]
+    return list(zip(variables, derivatives, strict=True))

@@ -98,19 +98,19 @@ def _places(problem: Problem, count: int) -> NDArray[np.int64]:
 
 def ask(problem: Problem, at: Array) -> Opinions:
     """Compute a problem twice, at the given times."""
-    found = collocation.integrate(problem, at)
+    values = collocation.integrate(problem, at)
     gauss = (
         f"Gauss collocation with {collocation.STAGES} stages, double-double arithmetic, "
         f"last Legendre coefficient {collocation.DECAY:g}"
     )
-    collocated = [[_EXACT.add(Decimal(x.real), Decimal(x.imag)) for x in row] for row in found.tolist()]
+    collocated = [[_EXACT.add(Decimal(x.real), Decimal(x.imag)) for x in row] for row in values.tolist()]
     if problem.system.dim <= SMALL:
         states = solutions.taylor(problem, at, solutions.TOLERANCE)
-        made = f"heyoka taylor_adaptive, fp_type=real128, tol={solutions.TOLERANCE}, high_accuracy=True"
-        return Opinions(at, states, made, gauss, _apart(problem, states, collocated), 1e-20)
+        taylor = f"heyoka taylor_adaptive, fp_type=real128, tol={solutions.TOLERANCE}, high_accuracy=True"
+        return Opinions(at, states, taylor, gauss, _apart(problem, states, collocated), 1e-20)
     other = solutions.taylor(problem, at, LONG_DOUBLE_TOLERANCE, "longdouble")
-    made = f"heyoka taylor_adaptive, fp_type=longdouble, tol={LONG_DOUBLE_TOLERANCE}, high_accuracy=True"
-    return Opinions(at, collocated, gauss, made, _apart(problem, collocated, other), 1e-15)
+    taylor = f"heyoka taylor_adaptive, fp_type=longdouble, tol={LONG_DOUBLE_TOLERANCE}, high_accuracy=True"
+    return Opinions(at, collocated, gauss, taylor, _apart(problem, collocated, other), 1e-15)
 
 
 def make(problem: Problem, until: float | None = None, at: Array | None = None) -> ReferenceFile:
@@ -145,7 +145,7 @@ def make(problem: Problem, until: float | None = None, at: Array | None = None) 
     horizon = "the whole interval" if opinions.times[kept - 1] == problem.t_end else "this horizon"
     states = np.array(opinions.states[:kept]).astype(float)
     text = str if problem.system.dim <= SMALL else _few_digits
-    return solutions.of(
+    return solutions.file_from(
         problem,
         opinions.times[:kept],
         [[text(value) for value in row] for row in opinions.states[:kept]],
@@ -167,13 +167,13 @@ def _few_digits(value: Decimal) -> str:
     return str(Context(prec=FEW_DIGITS).plus(value))
 
 
-def _apart(problem: Problem, one: list[list[Decimal]], other: list[list[Decimal]]) -> Array:
-    first, second = np.array(one), np.array(other)  # of decimals
+def _apart(problem: Problem, first_: list[list[Decimal]], other: list[list[Decimal]]) -> Array:
+    first, second = np.array(first_), np.array(other)  # of decimals
     a, b, gap = (np.abs(states).astype(float) for states in (first, second, first - second))
-    found = np.zeros(len(gap))
+    gaps = np.zeros(len(gap))
     dof = problem.system.dof or problem.system.dim
     for block in (slice(0, dof), slice(dof, None)):
         if gap[:, block].size:
             size = max(a[:, block].max(), b[:, block].max())
-            found = np.maximum(found, gap[:, block].max(axis=1) / (size or 1.0))
-    return np.maximum.accumulate(found)
+            gaps = np.maximum(gaps, gap[:, block].max(axis=1) / (size or 1.0))
+    return np.maximum.accumulate(gaps)

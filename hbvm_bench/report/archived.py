@@ -23,7 +23,7 @@ PLACE = "problem-"  # how the anchors of the sections begin whose figures are of
 
 def contents(document: Document, stores: Sequence[Store | Archive]) -> Contents:
     """Return what is kept of the runs that a document is made of, and of its figures."""
-    sections = [one for one in document.walk() if isinstance(one, Section) and one.key.startswith(PLACE)]
+    sections = [part for part in document.walk() if isinstance(part, Section) and part.key.startswith(PLACE)]
     beside = {name: value for store in stores for name, value in store.beside().items()}
     return Contents(
         runs=[_table(store) for store in stores],
@@ -46,16 +46,16 @@ def joined(store: Store, before: Path) -> list[Store | Archive]:
     records = reading.records(store)
     if not before.is_file() or not records:
         return [store]
-    kind, again = machine.kind(_machine(records)), {one.case.problem for one in records}
+    kind, again = machine.kind(_machine(records)), {record.case.problem for record in records}
     runs = []
     for old in archive.read(before):
         if old.index().campaign.name != store.index().campaign.name:
             raise InputError(
                 f"{str(before)!r} has results of {old.index().campaign.name!r}; give another place."
             )
-        left = [one for one in old.records() if one.case.problem not in again]
+        left = [record for record in old.records() if record.case.problem not in again]
         kept = old.records() if machine.kind(_machine(old.records())) != kind else left
-        runs += [old.of(kept)] if kept else []
+        runs += [old.with_records(kept)] if kept else []
     return [*runs, store]
 
 
@@ -65,7 +65,7 @@ def _machine(records: Sequence[Record]) -> dict[str, str | int]:
 
 def _table(store: Store | Archive) -> archive.Table:
     index, records = store.index(), reading.records(store)
-    store.learn()
+    store.add_known()
     named = tuple(index.campaign.page.series)
     series = {
         record.id: {
@@ -84,7 +84,7 @@ def _table(store: Store | Archive) -> archive.Table:
 
 def pictures(drawings: Sequence[Drawing], place: str) -> list[Picture]:
     """Return the figures that were drawn in one section of a page."""
-    return [_picture(one) for one in drawings if one.place == place]
+    return [_picture(drawing) for drawing in drawings if drawing.place == place]
 
 
 def _drawing(place: str, picture: Picture) -> Drawing:

@@ -31,7 +31,7 @@ from hbvm_bench.store import archive
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries import accuracies, goals, laws, needs, outcomes
 from hbvm_bench.summaries.points import by_family, family_of
-from hbvm_bench.summaries.rows import Task, by, columns, tasks
+from hbvm_bench.summaries.rows import Task, columns, grouped_by, tasks
 from hbvm_bench.summaries.table import Table
 
 # A report of more than these draws only its main figures.
@@ -50,18 +50,22 @@ KINDS = ("chosen", "default", "recommended", "as published", "outside its domain
 
 def _parts(results: Results) -> list[ProblemPart]:
     """Return what is said on each problem; made once for all blocks of a page."""
-    if (made := _made.get(results)) is not None:
-        return made
+    if (parts := _parts_of.get(results)) is not None:
+        return parts
     missing = [case for run in results.runs for case in results.missing(run)]
     printed = {case.problem: repr(make_problem(case.problem)) for case in missing}  # as the records have it
     tables = tasks(results.records)
     brief = len(tables) > BRIEF_PROBLEMS or len(results.records) > BRIEF_CASES
-    _made[results] = [
+    _parts_of[results] = [
         part(
             task.problem,
             [(record, results.series[record.id]) for record in members],
             results.look,
-            [case for case in missing if Task.of(replace(case, problem=printed[case.problem])) == task],
+            [
+                case
+                for case in missing
+                if Task.from_case(replace(case, problem=printed[case.problem])) == task
+            ],
             number,
             sampled=task.sampled(tables),
             brief=brief,
@@ -70,35 +74,37 @@ def _parts(results: Results) -> list[ProblemPart]:
         )
         for number, (task, members) in enumerate(tables.items(), 1)
     ]
-    return _made[results]
+    return _parts_of[results]
 
 
-_made: WeakKeyDictionary[Results, list[ProblemPart]] = WeakKeyDictionary()
+_parts_of: WeakKeyDictionary[Results, list[ProblemPart]] = WeakKeyDictionary()
 
 
 @block
 def goals_reached(results: Results) -> Table | None:
     """Return what the campaigns asked for, and what was measured; ``None`` where they asked for nothing."""
-    found = [one for run in results.runs for one in goals.verdicts(run.index.campaign, results.records)]
-    return goals.table(found) if found else None
+    verdicts = [
+        verdict for run in results.runs for verdict in goals.verdicts(run.index.campaign, results.records)
+    ]
+    return goals.table(verdicts) if verdicts else None
 
 
 @block
 def times_at_accuracies(results: Results) -> list[Table]:
     """Return the times at several position errors, of each campaign that has any."""
-    made = (accuracies.table(run.index.campaign, run.records) for run in results.runs)
-    return [one for one in made if one is not None]
+    tables = (accuracies.table(run.index.campaign, run.records) for run in results.runs)
+    return [table for table in tables if table is not None]
 
 
 @block
 def conditions(results: Results) -> list[Table]:
     """Return how far doubles determine the positions at the ends, where the references say so."""
     rows = []
-    for one in _parts(results):
-        known = solutions.find(one.problem)
-        if known is not None and (number := known.condition_at(one.problem.t_end)) is not None:
+    for item in _parts(results):
+        known = solutions.find(item.problem)
+        if known is not None and (number := known.condition_at(item.problem.t_end)) is not None:
             least = number * solutions.UNIT_ROUNDOFF
-            rows.append((one.ranked.problem, f"{one.problem.t_end:g}", f"{number:.1e}", f"{least:.1e}"))
+            rows.append((item.ranked.problem, f"{item.problem.t_end:g}", f"{number:.1e}", f"{least:.1e}"))
     note = (
         "The condition number is the largest relative change of a position at the end over a relative "
         "change of the state at the worst time before, to within a factor of about 2. The last column is "
@@ -123,7 +129,7 @@ def overview_of_one(results: Results) -> list[Block]:
 @block
 def problems_in_turn(results: Results) -> list[Section]:
     """Return the section of each problem."""
-    return [one.section for one in _parts(results)]
+    return [item.section for item in _parts(results)]
 
 
 @block
@@ -136,7 +142,7 @@ def raw_data(results: Results) -> Section:
 @block
 def sources(results: Results) -> Section:
     """Return what the problems are from, and how to cite the methods."""
-    references = [text for one in _parts(results) for text in one.problem.references]
+    references = [text for item in _parts(results) for text in item.problem.references]
     return Section("Sources", [Items([*dict.fromkeys(references), CITE])], "sources")
 
 
@@ -144,13 +150,13 @@ def _overall(results: Results, *, several: bool) -> list[Block]:
     records, look = results.records, results.look
     title = "Over all problems" if several else "Which integrator to take"
     numbers = {name: look[each[0].case.method].number for name, each in by_family(records).items()}
-    made = attempt(
+    blocks = attempt(
         ("which integrator for which need", partial(needs.table, records)),
         ("which integrator on which problem", partial(_outcomes, records)),
         ("the growth of the energy error", partial(laws.table, records)),
         ("performance profiles", partial(profiles, records, numbers)),
     )
-    return [Section(title, made, "overview", nav="Over all problems" * several)] if made else []
+    return [Section(title, blocks, "overview", nav="Over all problems" * several)] if blocks else []
 
 
 def _outcomes(records: Sequence[Record]) -> list[Block]:
@@ -176,18 +182,18 @@ def what_came_out(results: Results) -> Section:
         blocks += parts[0].summary
     elif len(parts) <= FEW:
         blocks += [
-            Section(one.ranked.title, one.summary, f"summary-{i}", code=one.ranked.problem)
-            for i, one in enumerate(parts, 1)
+            Section(item.ranked.title, item.summary, f"summary-{i}", code=item.ranked.problem)
+            for i, item in enumerate(parts, 1)
         ]
     else:
-        titles = [title for one in parts for title, rows in one.ranked.groups for _ in rows]
+        titles = [title for item in parts for title, rows in item.ranked.groups for _ in rows]
         counts = Counter(re.split("[,:]", title)[0].lower() for title in titles)
-        said = ", ".join(f"{what}: {count}" for what, count in counts.items())
+        said = ", ".join(f"{outcome}: {count}" for outcome, count in counts.items())
         blocks.append(f"{len(records)} cases on {len(parts)} problems; {said}.")
-    said = [(one.short, one.unit or "–", f"{one.label}. {one.description}") for one in METRICS.values()]
+    said = [(item.short, item.unit or "–", f"{item.label}. {item.description}") for item in METRICS.values()]
     meaning = Table("", ("column", "unit", "meaning"), said, words=(0, 1, 2))
     blocks += [
-        Rows(columns(records), [one.ranked for one in parts], results.look),
+        Rows(columns(records), [item.ranked for item in parts], results.look),
         Details("What the columns mean", [meaning]),
     ]
     return Section("What came out", blocks, "results", nav="Results")
@@ -200,16 +206,16 @@ def fairness(results: Results) -> Section:
     drawn = f"Drawn are the first {DRAWN_CASES} of {len(records)} cases; tables and data have all of them."
     campaigns = [run.index.campaign for run in runs]
     ends = any(entry.end is not None for campaign in campaigns for entry in campaign.entries())
-    timing = dict.fromkeys(words.timing(one.timing) for one in campaigns if one.timing.rounds)
+    timing = dict.fromkeys(words.timing(chosen.timing) for chosen in campaigns if chosen.timing.rounds)
     rules = (
         *([drawn] if len(records) > DRAWN_CASES else []),
         *(*words.RULES, *([words.ENDS] if ends else []), *timing),
         *(*outcomes.sentences(records), *provenance.processors(records)),
     )
     rows = []
-    for of, members in by(lambda record: (family_of(record), record.library), records).items():
+    for family, members in grouped_by(lambda record: (family_of(record), record.library), records).items():
         kinds = Counter(record.case.settings for record in members)
-        rows.append((*of, str(len(members)), *(str(kinds[kind]) for kind in KINDS)))
+        rows.append((*family, str(len(members)), *(str(kinds[kind]) for kind in KINDS)))
     head = ("method", "library", "settings", *KINDS)
     settings = Table("The number of settings of each method", head, rows, words=(0, 1))
     blocks = [Items(rules, "numbered"), settings]

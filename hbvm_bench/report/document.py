@@ -72,8 +72,8 @@ class Claims:
     @property
     def counts(self) -> dict[str, int]:
         """How many claims have which verdict."""
-        found = [claim.verdict for _, _, claims in self.groups for claim in claims]
-        return {verdict: found.count(verdict) for verdict in VERDICTS}
+        verdicts = [claim.verdict for _, _, claims in self.groups for claim in claims]
+        return {verdict: verdicts.count(verdict) for verdict in VERDICTS}
 
 
 @dataclass(frozen=True)
@@ -195,18 +195,18 @@ def attempt(*makers: Maker) -> list[Block]:
     A report is made once, after hours of computing: one figure that cannot be drawn must not
     take the others with it.
     """
-    made: list[Block] = []
+    blocks: list[Block] = []
     for title, make in makers:
         try:
-            found = make()
+            block = make()
         except Exception as error:
             reason = " ".join(f"{type(error).__name__}: {error}".split())
-            found = Failed(title, reason, traceback.format_exc())
-        if isinstance(found, Sequence) and not isinstance(found, str):
-            made.extend(found)
-        elif found is not None:
-            made.append(found)
-    return made
+            block = Failed(title, reason, traceback.format_exc())
+        if isinstance(block, Sequence) and not isinstance(block, str):
+            blocks.extend(block)
+        elif block is not None:
+            blocks.append(block)
+    return blocks
 
 
 def pieces(text: object) -> list[tuple[str, bool]]:

@@ -77,33 +77,37 @@ class Place:
 
 def pages(document: Document) -> dict[str, str]:
     """Return the pages of a document by name: ``index.html``, and one for each problem of a long one."""
-    sections = [one for one in document.blocks if isinstance(one, Section) and one.key.startswith(PLACE)]
+    sections = [
+        section
+        for section in document.blocks
+        if isinstance(section, Section) and section.key.startswith(PLACE)
+    ]
     table = next((block for block in document.walk() if isinstance(block, Results)), None)
     if table is None or len(sections) <= TOGETHER or sum(map(len, _rows_by_problem(table))) <= ONE_PAGE:
         return {"index.html": page(document)}
-    names = {one.key: f"{one.key}.html" for one in sections}
+    names = {section.key: f"{section.key}.html" for section in sections}
     contents = Section(
         "Problems",
-        [Links([(one.title, one.code, names[one.key]) for one in sections])],
+        [Links([(section.title, section.code, names[section.key]) for section in sections])],
         "problems",
         nav="Problems",
     )
     kept = [contents if block is sections[0] else block for block in document.blocks]
     first = [_without(block, table) for block in kept if block not in sections]
-    made = {"index.html": page(replace(document, blocks=first))}
-    for number, one in enumerate(sections):
+    texts = {"index.html": page(replace(document, blocks=first))}
+    for number, section in enumerate(sections):
         near = {"Previous problem": number - 1, "Next problem": number + 1}
         ways = {title: names[sections[i].key] for title, i in near.items() if 0 <= i < len(sections)}
         rows = replace(table, problems=[table.problems[number]])
         cases = Section("Cases", [rows], "results", nav="Cases")
         alone = replace(
             document,
-            title=one.title[:1].upper() + one.title[1:],
-            lead=[f"`{one.code}`"] if one.code else [],
-            blocks=[cases, *one.blocks],
+            title=section.title[:1].upper() + section.title[1:],
+            lead=[f"`{section.code}`"] if section.code else [],
+            blocks=[cases, *section.blocks],
         )
-        made[names[one.key]] = page(alone, {document.title: "index.html", **ways})
-    return made
+        texts[names[section.key]] = page(alone, {document.title: "index.html", **ways})
+    return texts
 
 
 def _rows_by_problem(table: Results) -> list[list[Row]]:
@@ -114,7 +118,9 @@ def _without(block: Block, left_out: Block) -> Block:
     """Return a block without another one that it holds."""
     if not isinstance(block, Section):
         return block
-    return replace(block, blocks=[_without(one, left_out) for one in block.blocks if one is not left_out])
+    return replace(
+        block, blocks=[_without(inner, left_out) for inner in block.blocks if inner is not left_out]
+    )
 
 
 def page(document: Document, ways: Mapping[str, str] | None = None) -> str:
@@ -127,18 +133,20 @@ def page(document: Document, ways: Mapping[str, str] | None = None) -> str:
     light = {f"--m{look.number}": look.light for look in looks}
     top = Place(2, {colour: name for name, colour in light.items()}, _within(document.pictures))
     waiting = [picture for picture in document.pictures if picture.key not in top.inlined]
-    made = {
+    parts = {
         "nav": [block for block in document.walk() if isinstance(block, Section) and block.nav],
         "main": printed(document.blocks, top),
         "css": Markup(text("style.css")),
         "script": Markup(script),
         "scripts": Markup(_source(script)),
-        "data": Markup(pack.data(document, {one.key: str(drawing(one, top.colours)) for one in waiting})),
+        "data": Markup(
+            pack.data(document, {picture_.key: str(drawing(picture_, top.colours)) for picture_ in waiting})
+        ),
         "light": variables({name: colour for colour, name in NEUTRALS.items()} | light),
         "dark": variables(DARK_NEUTRALS | {f"--m{look.number}": look.dark for look in looks}),
         "symbols": symbols(looks),
     }
-    return templates().get_template("base.html.j2").render(document=document, ways=ways or {}, **made)
+    return templates().get_template("base.html.j2").render(document=document, ways=ways or {}, **parts)
 
 
 def printed(blocks: Sequence[Block], at: Place) -> Markup:
@@ -151,12 +159,12 @@ def printed(blocks: Sequence[Block], at: Place) -> Markup:
 def templates() -> Environment:
     """Return the templates, with what they call."""
     loader = PackageLoader(HERE)
-    made = Environment(
+    environment = Environment(
         loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined
     )
     functions = (printed, words, cell, drawing, chip, call, bar, spread, sort_key, minor_columns)
-    made.globals |= {function.__name__: function for function in functions} | {"verdicts": VERDICTS}
-    return made
+    environment.globals |= {function.__name__: function for function in functions} | {"verdicts": VERDICTS}
+    return environment
 
 
 def cell(text: str) -> Markup:
@@ -171,7 +179,9 @@ def minor_columns(columns: Sequence[Metric]) -> set[str]:
 
 def call(text: str) -> Markup:
     """Return a method's text so that lines break between its arguments only."""
-    return Markup(", ").join(Markup('<span class="arg">{}</span>').format(one) for one in text.split(", "))
+    return Markup(", ").join(
+        Markup('<span class="arg">{}</span>').format(argument) for argument in text.split(", ")
+    )
 
 
 def bar(metric: Metric, cell: Cell, row: Row) -> int | None:
@@ -206,11 +216,11 @@ def sort_key(cell: Cell | None) -> Markup:
 
 def words(text: object) -> Markup:
     """Escape a text; what stands between backquotes becomes code, ``3.4e-15`` a power of ten."""
-    made = Markup("")
+    markup = Markup("")
     for piece, is_code in pieces(text):
         plain = Markup(MINUS.sub("−", POWER.sub(_power, str(escape(piece)))))
-        made += Markup("<code>{}</code>").format(piece) if is_code else plain
-    return made
+        markup += Markup("<code>{}</code>").format(piece) if is_code else plain
+    return markup
 
 
 def _power(match: re.Match[str]) -> str:

@@ -34,8 +34,8 @@ def write_pages(directory: Path) -> Iterator[Path]:
     for folder in sorted(path for path in directory.iterdir() if path.is_dir()):
         if (folder / archive.NAME).is_file():
             path = folder / "index.html"
-            made = pages(document(archive.read(folder / archive.NAME)))
-            write_all({folder / name: text.encode() for name, text in made.items()})
+            files = pages(document(archive.read(folder / archive.NAME)))
+            write_all({folder / name: text.encode() for name, text in files.items()})
             yield path
 
 
@@ -69,10 +69,10 @@ def _entry(folder: Path) -> list[str]:
     if len(first) > LONGEST:
         first = first[: first.rfind(" ", 0, LONGEST)].rstrip(" ,;:") + " …"
     place = f"{folder.name}/{name}"
-    made = [f"## [{title}]({place})"]
+    lines_ = [f"## [{title}]({place})"]
     if pictures := re.findall(r"!\[[^\]]*\]\(([^)\s]+)\)", "\n".join(lines)):
         alt, source = escape(re.sub(r"\\(.)", r"\1", title), quote=True), f"{folder.name}/{pictures[0]}"
-        made.append(f'<a href="{place}"><img src="{source}" width="{WIDTH}" alt="{alt}"></a>')
+        lines_.append(f'<a href="{place}"><img src="{source}" width="{WIDTH}" alt="{alt}"></a>')
     command = next((line.strip("` ") for line in lines if re.match(r"[` ]*hbvm-bench ", line)), "")
     links = [f"[text]({place})", *([f"made by `{command}`"] if command else [])]
-    return [*made, *([first] if first else []), " · ".join(links)]
+    return [*lines_, *([first] if first else []), " · ".join(links)]

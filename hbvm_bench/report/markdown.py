@@ -49,11 +49,16 @@ def printed(block: Block, level: int = 2, shown: Collection[str] = ()) -> str:
         case blocks.Failed():
             return f"**Not made: {words(block.title)}** ({words(block.reason)})"
         case blocks.Details():
-            inner = "\n\n".join(printed(one, level, shown) for one in block.blocks)
+            inner = "\n\n".join(printed(inner_block, level, shown) for inner_block in block.blocks)
             return f"<details>\n<summary>{plain(block.summary)}</summary>\n\n{inner}\n\n</details>"
         case blocks.Section():
             title = words(block.title) + (f": {code(block.code)}" if block.code else "")
-            return joined([f"{heading} {title}", *(printed(one, level + 1, shown) for one in block.blocks)])
+            return joined(
+                [
+                    f"{heading} {title}",
+                    *(printed(inner_block, level + 1, shown) for inner_block in block.blocks),
+                ]
+            )
         case Table():
             rows = [[cell(text) for text in row] for row in block.rows]
             table = lined([words(head) for head in block.flat_head], rows, block.words)
@@ -73,7 +78,8 @@ def _claims(block: blocks.Claims, heading: str) -> str:
     parts = [" · ".join(f"**{count}** {VERDICTS[key]}" for key, count in block.counts.items())]
     for title, _, claims in block.groups:
         rows = [
-            (words(one.words), words(one.paper), words(one.here), VERDICTS[one.verdict]) for one in claims
+            (words(claim.words), words(claim.paper), words(claim.here), VERDICTS[claim.verdict])
+            for claim in claims
         ]
         parts += [
             f"{heading} {words(title)}",
@@ -111,14 +117,14 @@ def _results(block: blocks.Results, level: int) -> str:
 
 def row_cells(columns: Sequence[Metric], row: Row) -> list[str]:
     """Return the cells of a row: void ones in brackets, times with their quartiles."""
-    made = []
+    cells = []
     for metric in columns:
         text = row.shown(metric.key)
         if metric.key == "warm_seconds" and row.record.timing is not None and row.record.timing.samples:
             summary = row.record.timing.summary
             text += f" [{seconds(summary['q1'])}, {seconds(summary['q3'])}]"
-        made.append(text)
-    return made
+        cells.append(text)
+    return cells
 
 
 def lined(head: Sequence[str], rows: Sequence[Sequence[str]], left: Collection[int]) -> str:

@@ -21,11 +21,11 @@ def packed(data: bytes) -> str:
 
 def data(document: Document, drawings: Mapping[str, str]) -> str:
     """Return what the figures of a page are made of, packed; ``drawings`` are those not in its text."""
-    made: dict[str, dict[str, Any]] = {"drawings": dict(drawings), "numbers": {}, "motions": {}}
+    content: dict[str, dict[str, Any]] = {"drawings": dict(drawings), "numbers": {}, "motions": {}}
     for picture in document.pictures:
         if (table := picture.numbers) is not None:
             said = {"head": table.head, "rows": table.rows, "words": len(table.words)}
-            made["numbers"][picture.key] = said
+            content["numbers"][picture.key] = said
         if picture.motion is not None:
-            made["motions"][picture.key] = picture.motion
-    return packed(msgspec.json.encode(made))
+            content["motions"][picture.key] = picture.motion
+    return packed(msgspec.json.encode(content))

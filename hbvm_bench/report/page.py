@@ -86,10 +86,10 @@ class Results:
     @cached_property
     def by_processor(self) -> dict[str, list[Kept]]:
         """The runs by the kind of processor, by its name."""
-        found: dict[str, list[Kept]] = {}
+        runs_of: dict[str, list[Kept]] = {}
         for run in self.runs:
-            found.setdefault(machine.kind(run.machine), []).append(run)
-        return dict(sorted(found.items()))
+            runs_of.setdefault(machine.kind(run.machine), []).append(run)
+        return dict(sorted(runs_of.items()))
 
     def drawn(self, place: str) -> list[Picture]:
         """Return the figures of a section as an archive has them."""
@@ -160,14 +160,14 @@ def gather(stores: Stores) -> Results:
     last = None
     for number, (key, (record, store)) in enumerate(furthest.items()):
         if store is not last:
-            store.learn()  # of two runs each may have a reference of its own
+            store.add_known()  # of two runs each may have a reference of its own
             last = store
-        found, series[key] = record, {}
+        reread, series[key] = record, {}
         if isinstance(store, Archive):
             series[key] = store.series(key)
         elif number < DRAWN_CASES:
-            found, series[key] = _read(record, store)
-        records.append(found)
+            reread, series[key] = _read(record, store)
+        records.append(reread)
     beside = {name: value for store in stores for name, value in store.beside().items()}
     return Results(runs, records, series, _drawings(stores), beside)
 
@@ -181,11 +181,11 @@ def page_of(results: Results) -> Document:
     """Return the page on results; raises what `find` does."""
     page, campaigns = results.page, [run.index.campaign for run in results.runs]
     makers = [(name, partial(find(name), results)) for name in page.blocks or DEFAULT]
-    one = len({campaign.name for campaign in campaigns}) == 1
+    single = len({campaign.name for campaign in campaigns}) == 1
     titles = [campaign.title or campaign.name for campaign in campaigns]
     together = f"{len(titles)} runs together: {'; '.join(titles)}"
     return Document(
-        titles[0] if one and (page.by_processor or len(titles) == 1) else together,
+        titles[0] if single and (page.by_processor or len(titles) == 1) else together,
         page.lead or ([campaigns[0].description] if len(campaigns) == 1 else []),
         attempt(*makers),
         list(results.look.values()),

@@ -46,7 +46,7 @@ class ProblemPart:
 
 def part(
     text: str,
-    found: Sequence[tuple[Record, dict[str, Array]]],
+    cases_found: Sequence[tuple[Record, dict[str, Array]]],
     look: dict[str, Look],
     missing: Sequence[Case],
     number: int,
@@ -65,10 +65,12 @@ def part(
     ``drawings`` are its figures where they are drawn already.
     """
     problem = make_problem(text)
-    records = [record for record, _ in found]
+    records = [record for record, _ in cases_found]
     known = solutions.find(problem)
     ensemble = records[0].case.ensemble
-    cases = [Drawn(record, look[record.case.method], series) for record, series in found if ensemble is None]
+    cases = [
+        Drawn(record, look[record.case.method], series) for record, series in cases_found if ensemble is None
+    ]
     drawn = [case for case in cases if "t" in case.series and case.series["t"].size]
     known_ends = ensemble is not None and any(number_of(record, "position_end") for record in records)
     ends = min(ensemble.count, WITNESSES) if ensemble is not None and known_ends else 0
@@ -106,10 +108,10 @@ def _figures(
 
     @styled
     def finished(make: Callable[[], Any]) -> Picture | None:
-        if (made := make()) is None:
+        if (drawn := make()) is None:
             return None
-        said = "" if made.key == "work-precision" else note
-        return replace(made, key=made.key + suffix, caption=made.caption + said)
+        said = "" if drawn.key == "work-precision" else note
+        return replace(drawn, key=drawn.key + suffix, caption=drawn.caption + said)
 
     makers = _makers(problem, cases, main, known, brief=brief)
     return attempt(*((f"{title}, {problem!r}", partial(finished, make)) for title, make in makers))
@@ -120,25 +122,25 @@ def _makers(
 ) -> list[Maker]:
     """Return what draws each figure, in order; a new one is a line here."""
 
-    def errors(what: OverTime) -> Maker:
-        return what.title, lambda: over_time.over_time(main, what)
+    def errors(spec: OverTime) -> Maker:
+        return spec.title, lambda: over_time.over_time(main, spec)
 
-    made: list[Maker] = [
+    makers: list[Maker] = [
         ("Work and precision", lambda: work_precision(cases)),
         ("Energy drift", lambda: drift_figure(main)),
     ]
     if problem.name == "sitnikov" and not brief:
-        made.append(("The system in space", lambda: motion.still(cases, "The system in space")))
-    made += [errors(what) for what in (OVER_TIME[:1] if brief else (*OVER_TIME, *_other_invariants(cases)))]
-    made += [
+        makers.append(("The system in space", lambda: motion.still(cases, "The system in space")))
+    makers += [errors(spec) for spec in (OVER_TIME[:1] if brief else (*OVER_TIME, *_other_invariants(cases)))]
+    makers += [
         ("Phase portrait", lambda: portraits.portrait(problem, main)),
         ("Section", lambda: portraits.section(problem, main)),
     ]
     if not brief:
         own = views.VIEWS.get(problem.name or "", ())
-        made += [("A view of this problem", lambda view=view: view(problem, cases, known)) for view in own]
-        made.append(("Step sizes", lambda: views.step_sizes(cases)))
-    return made
+        makers += [("A view of this problem", lambda view=view: view(problem, cases, known)) for view in own]
+        makers.append(("Step sizes", lambda: views.step_sizes(cases)))
+    return makers
 
 
 def telling(cases: Sequence[Drawn]) -> list[Drawn]:
@@ -193,25 +195,25 @@ def _other_invariants(cases: Sequence[Drawn]) -> list[OverTime]:
     series = [(name, values) for case in cases for name, values in case.series.items()]
     names = dict.fromkeys(name for name, _ in series if name.startswith("error.") and name not in own)
     caption = "Relative error, or absolute where the value at the start is 0; a vector's 2-norm."
-    made = []
+    specs = []
     for name in names:
         if any(np.any(values != 0.0) for other, values in series if other == name):
             said = name.removeprefix("error.").replace("_", " ")
             key, title = "invariant-" + re.sub(r"\W+", "-", said), f"{said.capitalize()}: error over time"
-            made.append(OverTime(key, title, f"error of {said}", name, -17, 2, caption))
-    return made
+            specs.append(OverTime(key, title, f"error of {said}", name, -17, 2, caption))
+    return specs
 
 
 def _truth(problem: Problem, known: Reference | None) -> Items | None:
     """Return what is known of the trusted solution, as far as the table's readers want it."""
     if known is None:
         return None
-    made = known.provenance
-    version = f", version {made['heyoka']}" if "heyoka" in made else ""
-    check = f"; {made['check']}" if "check" in made else ""
-    said = [f"Reference: {made.get('method', '')}{version}{check}"]
-    if "agreement" in made:
-        said.append(f"The two agree to {made['agreement']}")
+    provenance = known.provenance
+    version = f", version {provenance['heyoka']}" if "heyoka" in provenance else ""
+    check = f"; {provenance['check']}" if "check" in provenance else ""
+    said = [f"Reference: {provenance.get('method', '')}{version}{check}"]
+    if "agreement" in provenance:
+        said.append(f"The two agree to {provenance['agreement']}")
     if (number := known.condition_at(problem.t_end)) is not None:
         said.append(
             f"Condition number of the positions at the end: {number:.1e}. A state that is rounded to doubles "

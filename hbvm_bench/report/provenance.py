@@ -22,15 +22,17 @@ BUILT = {
 
 def days(records: Sequence[Record]) -> str:
     """Return the days on which the cases ran: ``"2026-11-21"``, ``"2026-11-20 to 2026-11-21"``."""
-    found = sorted({datetime.fromisoformat(r.finished).date().isoformat() for r in records if r.finished})
-    return "" if not found else found[0] if found[0] == found[-1] else f"{found[0]} to {found[-1]}"
+    days_ = sorted({datetime.fromisoformat(r.finished).date().isoformat() for r in records if r.finished})
+    return "" if not days_ else days_[0] if days_[0] == days_[-1] else f"{days_[0]} to {days_[-1]}"
 
 
 def versions(records: Sequence[Record]) -> dict[str, str]:
     """Return the versions of the libraries, and how their machine code came about."""
-    found = _each_once([record.versions for record in records], ", ")
-    built = {name: BUILT.get(name.lower()) for name in found}
-    return {name: f"{numbers} ({built[name]})" if built[name] else numbers for name, numbers in found.items()}
+    numbers_of = _each_once([record.versions for record in records], ", ")
+    built = {name: BUILT.get(name.lower()) for name in numbers_of}
+    return {
+        name: f"{numbers} ({built[name]})" if built[name] else numbers for name, numbers in numbers_of.items()
+    }
 
 
 def processors(records: Sequence[Record]) -> list[str]:
@@ -41,17 +43,17 @@ def processors(records: Sequence[Record]) -> list[str]:
 
 def machines(records: Sequence[Record]) -> dict[str, str]:
     """Return what is known of the machine."""
-    found = _each_once([record.machine for record in records], " | ")
-    return {name.replace("_", " "): values for name, values in found.items()}
+    values_of = _each_once([record.machine for record in records], " | ")
+    return {name.replace("_", " "): values for name, values in values_of.items()}
 
 
 def _each_once(all_: Sequence[Mapping[str, object]], glue: str) -> dict[str, str]:
     """Return the values by name; those that differ stand side by side."""
-    found: dict[str, set[str]] = {}
-    for one in all_:
-        for name, value in one.items():
-            found.setdefault(name, set()).add(str(value))
-    return {name: glue.join(sorted(values)) for name, values in sorted(found.items())}
+    values_of: dict[str, set[str]] = {}
+    for mapping in all_:
+        for name, value in mapping.items():
+            values_of.setdefault(name, set()).add(str(value))
+    return {name: glue.join(sorted(values)) for name, values in sorted(values_of.items())}
 
 
 def again(
@@ -73,5 +75,9 @@ def again(
 
 def facts(machine: Mapping[str, object], versions: Mapping[str, object]) -> list[Table]:
     """Return the tables of what is known of the machine and of the libraries."""
-    found = ((("machine", ""), machine), (("library", "version"), versions))
-    return [Table("", head, [(k, str(v)) for k, v in of.items()], words=(0, 1)) for head, of in found if of]
+    tables = ((("machine", ""), machine), (("library", "version"), versions))
+    return [
+        Table("", head, [(k, str(v)) for k, v in values.items()], words=(0, 1))
+        for head, values in tables
+        if values
+    ]

@@ -30,10 +30,10 @@ def console(*, stderr: bool = False) -> Console:
 
     Nor does it take brackets in a text for a style: what is printed may be somebody else's.
     """
-    made = Console(stderr=stderr, highlight=False, markup=False)
-    if not made.is_terminal:
-        made.width = PIPE_WIDTH
-    return made
+    result = Console(stderr=stderr, highlight=False, markup=False)
+    if not result.is_terminal:
+        result.width = PIPE_WIDTH
+    return result
 
 
 def print_json(value: Any) -> None:
@@ -48,14 +48,14 @@ def empty(title: str) -> RichTable:
 
 def print_table(table: Table) -> None:
     """Print a table of text."""
-    made = empty(table.title)
-    made.caption = table.note
+    printed = empty(table.title)
+    printed.caption = table.note
     for index, head in enumerate(table.head):
         justify = "left" if index in table.words else "right"
-        made.add_column(Text(head), justify=justify, overflow="fold", min_width=6)
+        printed.add_column(Text(head), justify=justify, overflow="fold", min_width=6)
     for row in table.rows:
-        made.add_row(*(Text(cell) for cell in row))
-    console().print(made)
+        printed.add_row(*(Text(cell) for cell in row))
+    console().print(printed)
 
 
 def print_results(
@@ -69,8 +69,8 @@ def print_results(
 
 def print_goals(campaign: Campaign, records: Sequence[Record]) -> None:
     """Print the verdicts on what a campaign asked for; nothing where it asked for nothing."""
-    if found := goals.verdicts(campaign, records):
-        print_table(goals.table(found))
+    if verdicts := goals.verdicts(campaign, records):
+        print_table(goals.table(verdicts))
 
 
 def results(
@@ -83,10 +83,10 @@ def results(
 
     The metrics are those of ``keys``, or the headline ones that fit into the width, in characters.
     """
-    found = tasks(records)
+    records_of = tasks(records)
     return [
-        _results(task.problem + at_once(task.ensemble) + task.sampled(found), members, keys, sort, width)
-        for task, members in found.items()
+        _results(task.problem + at_once(task.ensemble) + task.sampled(records_of), members, keys, sort, width)
+        for task, members in records_of.items()
     ]
 
 
@@ -97,25 +97,25 @@ def _results(
     lines = rows(records, sort)
     hidden = 0 if keys else len(shown) - len(shown := _fitting(shown, lines, width))
     number_of = numbers(records)
-    made = empty(title)
-    made.add_column("#", justify="right", no_wrap=True)
-    made.add_column("method", overflow="fold", min_width=NARROWEST)
+    table = empty(title)
+    table.add_column("#", justify="right", no_wrap=True)
+    table.add_column("method", overflow="fold", min_width=NARROWEST)
     for metric in shown:
-        made.add_column(metric.short, justify="right", no_wrap=True)
+        table.add_column(metric.short, justify="right", no_wrap=True)
     remarks = RichTable.grid(padding=(0, 2))
     for title, members in grouped(lines):
-        made.add_section()
-        made.add_row("", Text(title, style="bold italic"))
+        table.add_section()
+        table.add_row("", Text(title, style="bold italic"))
         for row in members:
             number, method = str(number_of[row.record.id]), row.record.case.method
             name = Text(method, style="bold cyan" if row.record.role == "ours" else "")
-            made.add_row(number, name, *(_cell(row, metric.key) for metric in shown))
+            table.add_row(number, name, *(_cell(row, metric.key) for metric in shown))
             if row.remark:
                 remarks.add_row(Text(number, justify="right"), Text(f"{method}: {row.remark}."))
     note = "In brackets: excluded, because the run left its trajectory or did not reach the end."
     if hidden:
         note += f" {hidden} columns do not fit; a wider terminal or --metric shows them."
-    return Group(made, Text(note, style="dim"), remarks, "")
+    return Group(table, Text(note, style="dim"), remarks, "")
 
 
 def _fitting(shown: list[Metric], lines: Sequence[Row], width: int) -> list[Metric]:

@@ -183,8 +183,8 @@ def excluded(records: Sequence[Record]) -> list[str]:
 
 def _ranked(records: Sequence[Record], key: str) -> list[Record]:
     """Return the cases that have a metric, the least first."""
-    found = [(value, record) for record in records if (value := number(record, key)) is not None]
-    return [record for _, record in sorted(found, key=lambda pair: pair[0])]
+    pairs = [(value, record) for record in records if (value := number(record, key)) is not None]
+    return [record for _, record in sorted(pairs, key=lambda pair: pair[0])]
 
 
 def _best(title: str, ranked: Sequence[Record], key: str) -> str:

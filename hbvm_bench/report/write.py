@@ -11,9 +11,9 @@ from hbvm_bench.store.files import write_all
 
 def rendered(document: Document) -> dict[str, bytes]:
     """Return all files of a document by their path in its directory."""
-    made = {document.name: markdown(document).encode()}
-    made |= {name: text.encode() for name, text in pages(document).items()}
-    return {picture.file: picture.svg.encode() for picture in document.shown} | made
+    files = {document.name: markdown(document).encode()}
+    files |= {name: text.encode() for name, text in pages(document).items()}
+    return {picture.file: picture.svg.encode() for picture in document.shown} | files
 
 
 def write(document: Document, directory: Path, beside: Mapping[str, bytes] | None = None) -> list[Path]:

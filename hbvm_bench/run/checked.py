@@ -27,7 +27,7 @@ from hbvm_bench.campaign.sweep import fill
 from hbvm_bench.measure.measured import PLAIN, PREFIXES
 from hbvm_bench.measure.metrics import find
 from hbvm_bench.reference import solutions
-from hbvm_bench.summaries.rows import Task, by
+from hbvm_bench.summaries.rows import Task, grouped_by
 from problems.errors import InputError, unknown
 
 LEAST = {"wall_seconds": 0.1, "compile_seconds": 0.1, "memory_gib": 0.1}
@@ -49,7 +49,7 @@ def check(campaign: Campaign, cases: Sequence[Resolved]) -> None:
     """
     _limits(campaign.limits)
     _timing(campaign.timing)
-    for method in (*campaign.methods, *(one for many in campaign.ensembles for one in many.methods)):
+    for method in (*campaign.methods, *(item for many in campaign.ensembles for item in many.methods)):
         _settings(method)
     for many in campaign.ensembles:
         _ensemble(many)
@@ -68,7 +68,7 @@ def check(campaign: Campaign, cases: Sequence[Resolved]) -> None:
         if not campaign.quick:  # which shortens the spans and keeps the grids
             _grid(campaign.grid if entry.grid is None else entry.grid, name, here[name])
     for goal in campaign.goals:
-        _goal(goal, campaign, [one for name in goal.only or here for one in here[name]])
+        _goal(goal, campaign, [item for name in goal.only or here for item in here[name]])
 
 
 def _limits(limits: Limits) -> None:
@@ -124,7 +124,7 @@ def _series(page: Page, cases: Sequence[Resolved]) -> None:
     asked = [name for name in page.series if not name.startswith(PREFIXES["extra"])]
     if not asked:
         return
-    problems = {repr(one.problem): one.problem for one in cases}.values()
+    problems = {repr(case.problem): case.problem for case in cases}.values()
     known = {*PLAIN, PREFIXES["drift"] + "t"}
     for problem in problems:
         invariants, start = problem.system.invariants, problem.y0[None]
@@ -137,7 +137,7 @@ def _series(page: Page, cases: Sequence[Resolved]) -> None:
 
 def _by_name(campaign: Campaign, cases: Sequence[Resolved]) -> dict[str, list[Resolved]]:
     """Return the cases by what a campaign calls their problems and ensembles."""
-    found: dict[str, list[Resolved]] = {}
+    cases_of: dict[str, list[Resolved]] = {}
     there = [
         (name_of(entry), Task.on(repr(make_problem(fill(entry.use, values))), entry.grid or campaign.grid))
         for entry in campaign.entries()
@@ -146,14 +146,14 @@ def _by_name(campaign: Campaign, cases: Sequence[Resolved]) -> dict[str, list[Re
         (name_of(many.entry), Task.on(repr(make_problem(many.problem)), ensemble=many.ensemble))
         for many in campaign.ensembles
     ]
-    of_task = by(lambda one: Task.of(one.case), cases)
+    of_task = grouped_by(lambda case: Task.from_case(case.case), cases)
     for name, task in there:  # two entries may be one task, as the spans of a quick run
-        found.setdefault(name, []).extend(of_task.get(task, []))
-    return found
+        cases_of.setdefault(name, []).extend(of_task.get(task, []))
+    return cases_of
 
 
 def _grid(grid: Grid, name: str, cases: Iterable[Resolved]) -> None:
-    longest = max(abs(one.problem.t_end - one.problem.t0) for one in cases)
+    longest = max(abs(case.problem.t_end - case.problem.t0) for case in cases)
     lengths = {"step": [grid.step], "multiple_of": [grid.multiple_of], "also": grid.also}
     for key, given in lengths.items():
         for length in given:
@@ -170,7 +170,7 @@ def _metrics(keys: Iterable[str], cases: Sequence[Resolved]) -> None:
             raise InputError(
                 f"the metric {metric.key!r} cannot be asked for: no side of it is the better one."
             )
-        if metric.problem and all(one.problem.name != metric.problem for one in cases):
+        if metric.problem and all(case.problem.name != metric.problem for case in cases):
             raise InputError(f"the metric {metric.key!r} is of {metric.problem} alone; ask for another one.")
 
 
@@ -180,16 +180,16 @@ def _goal(goal: Goal, campaign: Campaign, cases: Sequence[Resolved]) -> None:
         raise InputError(f"a goal asks for {goal.metric}, and timing has rounds = 0; take some.")
     if goal.at is not None and goal.no_worse:
         raise InputError("no_worse= of a goal belongs to against= and ratio=; with at= give within=.")
-    _method("method of ours", goal.method, campaign.quick, [one for one in cases if is_ours(one.method)])
+    _method("method of ours", goal.method, campaign.quick, [case for case in cases if is_ours(case.method)])
     if goal.ratio is not None:
-        theirs = [one for one in cases if not is_ours(one.method)]
+        theirs = [case for case in cases if not is_ours(case.method)]
         _method("peer that the goal's problems have", goal.against, campaign.quick, theirs)
 
 
 def _method(kind: str, name: str, quick: bool, cases: Sequence[Resolved]) -> None:
     """Refuse a name of which the goal's problems have no case; a quick run may lack the setting."""
-    families = {parse_spec(one.case.method).name for one in cases}
-    known = families | {one.case.method for one in cases}
+    families = {parse_spec(case.case.method).name for case in cases}
+    known = families | {case.case.method for case in cases}
     if not known:
         raise InputError(
             f"a goal's problems have no {kind.partition(' that')[0]}; give a method, or leave it out."

@@ -44,9 +44,9 @@ def kill(pid: int) -> None:
         return
     with contextlib.suppress(psutil.NoSuchProcess):
         process = psutil.Process(pid)
-        for one in (*process.children(recursive=True), process):
+        for member in (*process.children(recursive=True), process):
             with contextlib.suppress(psutil.Error):
-                one.kill()
+                member.kill()
 
 
 def limit_and_die_with(parent: int) -> None:

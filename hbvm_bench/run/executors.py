@@ -69,9 +69,9 @@ def opened(name: str = LOCAL, jobs: int | None = None) -> Iterator[Pool]:
         with _dask(name.removeprefix(DASK), jobs) as pool:
             yield pool
     elif ":" in name:
-        executor = _made(name, jobs)
+        executor = _imported(name, jobs)
         try:
-            yield of(executor, jobs)
+            yield pool_of(executor, jobs)
         finally:
             executor.shutdown(wait=True, cancel_futures=True)
     else:
@@ -80,7 +80,7 @@ def opened(name: str = LOCAL, jobs: int | None = None) -> Iterator[Pool]:
         )
 
 
-def of(executor: Executor, jobs: int | None = None) -> Pool:
+def pool_of(executor: Executor, jobs: int | None = None) -> Pool:
     """Return the pool of any executor; without ``jobs`` it has as many slots as the executor says."""
     slots = jobs or getattr(executor, "_max_workers", None) or os.cpu_count() or 1
     return Pool(executor, lambda: slots, where=f"by {type(executor).__name__}")
@@ -141,7 +141,7 @@ def _dask(address: str, jobs: int | None) -> Iterator[Pool]:
         client.close(timeout=2 if lost() else 10)
 
 
-def _made(name: str, jobs: int | None) -> Executor:
+def _imported(name: str, jobs: int | None) -> Executor:
     module, _, attribute = name.partition(":")
     try:
         factory = getattr(import_module(module), attribute)
@@ -151,9 +151,9 @@ def _made(name: str, jobs: int | None) -> Executor:
     if inspect.isclass(factory) and issubclass(factory, ProcessPoolExecutor):
         options["mp_context"] = multiprocessing.get_context("spawn")  # a fork would copy half-held locks
     try:
-        made = factory(**options)
+        executor = factory(**options)
     except (TypeError, ValueError) as error:
         raise InputError(f"{name} cannot be made: {error}.") from None
-    if not isinstance(made, concurrent.futures.Executor):
-        raise InputError(f"{name} is no concurrent.futures.Executor but {type(made).__name__}.")
-    return made
+    if not isinstance(executor, concurrent.futures.Executor):
+        raise InputError(f"{name} is no concurrent.futures.Executor but {type(executor).__name__}.")
+    return executor

@@ -122,6 +122,6 @@ def _submitted(pool: Pool, task: bytes) -> Future[tuple[bytes, bytes]]:
 
 
 def _stored(store: Store, record: bytes, series: bytes) -> Record:
-    made = decoded(record, Record)
-    store.save(made, series or None)
-    return made
+    decoded_record = decoded(record, Record)
+    store.save(decoded_record, series or None)
+    return decoded_record

@@ -29,7 +29,7 @@ def make_missing(campaign: Campaign, store: Store, tell: Callable[[str], None]) 
     problems.errors.InputError
         For an end that is no state of its problem.
     """
-    made = False
+    any_made = False
     for entry in campaign.entries():
         for values in chosen(entry) if entry.reference or entry.end is not None else []:
             text = fill(entry.use, values)
@@ -37,9 +37,9 @@ def make_missing(campaign: Campaign, store: Store, tell: Callable[[str], None]) 
             if entry.end is not None:
                 given = solutions.of_end(problem, entry.end)
                 if given != solutions.find_file(problem):
-                    solutions.know(solutions.encode(given))
+                    solutions.add_known(solutions.encode(given))
                     store.keep(text)
-                    made = True
+                    any_made = True
                 continue
             samples = (campaign.grid if entry.grid is None else entry.grid).times(problem)
             known = solutions.find(problem)
@@ -49,14 +49,14 @@ def make_missing(campaign: Campaign, store: Store, tell: Callable[[str], None]) 
 
             tell(f"computing a reference of {text} by two methods ...")
             try:
-                found = trusted.make(problem, at=trusted.some(problem, samples))
+                file = trusted.make(problem, at=trusted.some(problem, samples))
             except MissingLibraryError:
                 raise
             except InputError as error:
                 tell(f"{text} has no reference: {error}")
                 continue
-            solutions.know(solutions.encode(found))
+            solutions.add_known(solutions.encode(file))
             store.keep(text)
-            tell(f"the two agree to {found.provenance['agreement']}")
-            made = True
-    return made
+            tell(f"the two agree to {file.provenance['agreement']}")
+            any_made = True
+    return any_made

@@ -59,7 +59,7 @@ class Ended:
         """Say how it ended, as part of a sentence."""
         if self.code >= 0:
             return f"ended with exit code {self.code}"
-        known = {one.value: one.name for one in signal.Signals}
+        known = {signal_.value: signal_.name for signal_ in signal.Signals}
         return f"ended by signal {known.get(-self.code, -self.code)}"
 
 
@@ -194,5 +194,5 @@ def _drain(output: int, kept: deque[bytes]) -> None:
 
 
 def _peak_gib(pid: int) -> float:
-    held = memory.of(pid)
+    held = memory.of_process(pid)
     return max(held.peak, held.resident + held.swapped) / 2**20  # what was swapped out is eaten, too

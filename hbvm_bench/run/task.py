@@ -85,7 +85,7 @@ def execute(task: bytes) -> tuple[bytes, bytes]:
 
 
 def _executed(asked: Request) -> tuple[bytes, bytes]:
-    own.learn(asked.beside)
+    own.add_known(asked.beside)
     ((key, case),) = asked.cases.items()
     try:
         resolved = resolve(case)
@@ -202,8 +202,8 @@ def _difference(versions: dict[str, str], resolved: Resolved) -> str:
         for name, version in versions.items()
         if here.get(name) != version
     ]
-    what = ", ".join(differing) or "other sources of hbvm-bench"
-    return f"{platform.node()} would run another case than was asked for: it has {what}"
+    difference = ", ".join(differing) or "other sources of hbvm-bench"
+    return f"{platform.node()} would run another case than was asked for: it has {difference}"
 
 
 def _result(scratch: Path, ended: Ended, limits: Limits) -> tuple[Result, bytes]:

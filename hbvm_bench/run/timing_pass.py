@@ -60,7 +60,7 @@ def time_cases(
     failed: set[str] = set()  # in this pass; the next one tries them again
     with machine.leaving_a_core() as core:
         for number, group in _missing(cases, store, plan, here):
-            loaded = [record for one in group if (record := store.load(one.id)) is not None]
+            loaded = [record for case in group if (record := store.load(case.id)) is not None]
             records = [reading.kept(store, record) for record in loaded]
             if len(records) < len(group) or group[0].id in failed:
                 continue
@@ -68,10 +68,10 @@ def time_cases(
             if plan.interleaved:
                 timings = _together(group, records, plan, limits, core, here)
             else:
-                (made,) = _asked(group, plan, limits, core)
+                (more,) = _asked(group, plan, limits, core)
                 before = _timing_of(records[0], plan, here)
-                timings = [replace(before, rounds=[*before.rounds, *made.rounds], why=made.why)]
-                failed |= {group[0].id} if made.why else set()
+                timings = [replace(before, rounds=[*before.rounds, *more.rounds], why=more.why)]
+                failed |= {group[0].id} if more.why else set()
             for record, timing in zip(loaded, timings, strict=True):
                 store.save(replace(record, timing=timing))
 
@@ -83,7 +83,7 @@ def missing_visits(cases: Sequence[Resolved], store: Store, plan: TimingPlan) ->
 
 def outdated(cases: Sequence[Resolved], store: Store, plan: TimingPlan) -> int:
     """Return how many cases have times that were taken by another plan, or do not say by which."""
-    records = (store.load(one.id) for one in cases)
+    records = (store.load(case.id) for case in cases)
     timings = [record.timing for record in records if record is not None and record.timing is not None]
     return sum(bool(timing.rounds) and timing.plan != plan for timing in timings)
 
@@ -101,17 +101,17 @@ def _missing(
     Rounds of different processes do not belong together: where one case of a problem is missing among its
     interleaved times, all of them are visited.
     """
-    loaded = ((one, store.load(one.id)) for one in cases)
-    known = [(one, record) for one, record in loaded if record is not None and timeable(record)]
+    loaded = ((case, store.load(case.id)) for case in cases)
+    known = [(case, record) for case, record in loaded if record is not None and timeable(record)]
     if not plan.interleaved:
-        taken = {one.id: len(_timing_of(record, plan, here).rounds) for one, record in known}
+        taken = {case.id: len(_timing_of(record, plan, here).rounds) for case, record in known}
         rounds = range(plan.rounds)
-        return [(number, [one]) for number in rounds for one, _ in known if taken[one.id] <= number]
+        return [(number, [case]) for number in rounds for case, _ in known if taken[case.id] <= number]
     groups: dict[object, list[tuple[Resolved, Record]]] = {}
-    for one, record in known if plan.rounds else ():
-        groups.setdefault((one.case.problem, one.case.ensemble), []).append((one, record))
+    for case, record in known if plan.rounds else ():
+        groups.setdefault((case.case.problem, case.case.ensemble), []).append((case, record))
     return [
-        (0, [one for one, _ in group])
+        (0, [case for case, _ in group])
         for group in groups.values()
         if not _is_timed([record for _, record in group], plan, here)
     ]
@@ -119,7 +119,7 @@ def _missing(
 
 def _is_timed(group: Sequence[Record], plan: TimingPlan, here: Machine) -> bool:
     """Whether one process has timed all cases of a problem in turn, by this plan and on this machine."""
-    timings = [one.timing for one in group if one.timing and _stands(one.timing, plan, here)]
+    timings = [record.timing for record in group if record.timing and _stands(record.timing, plan, here)]
     processes = {timing.process for timing in timings}
     enough = any(len(timing.rounds) >= plan.rounds for timing in timings)
     return len(timings) == len(group) and len(processes) == 1 and "" not in processes and enough
@@ -134,7 +134,7 @@ def _together(
     here: Machine,
 ) -> list[Timing]:
     """Time the cases of a problem in turn, but for those on another trajectory."""
-    on = [one for one, record in zip(group, records, strict=True) if not record.result.violation]
+    on = [item for item, record in zip(group, records, strict=True) if not record.result.violation]
     process = datetime.now(UTC).isoformat()
     together = replace(
         limits,
@@ -146,14 +146,16 @@ def _together(
         for place, numbers in enumerate(shared(plan.rounds, plan.compilations))
         if on
     ]
-    made = zip((one.id for one in on), map(_joined, zip(*parts, strict=True)), strict=True) if on else ()
-    timings = {one.id: Timing(why=OFF) for one in group} | dict(made)
-    return [replace(one, plan=plan, machine=here, process=process) for one in timings.values()]
+    pairs = zip((item.id for item in on), map(_joined, zip(*parts, strict=True)), strict=True) if on else ()
+    timings = {item.id: Timing(why=OFF) for item in group} | dict(pairs)
+    return [replace(item, plan=plan, machine=here, process=process) for item in timings.values()]
 
 
 def _joined(parts: Sequence[Timing]) -> Timing:
     """Return the times of several processes as one, round by round."""
-    rounds = sorted((one for part in parts for one in part.rounds), key=lambda one: one.number or 0)
+    rounds = sorted(
+        (round_ for part in parts for round_ in part.rounds), key=lambda round_: round_.number or 0
+    )
     loads = [part.load for part in parts if part.load is not None]
     return Timing(
         rounds=rounds,
@@ -167,7 +169,7 @@ def _asked(
     cases: Sequence[Resolved], plan: TimingPlan, limits: Limits, core: int | None, **part: Any
 ) -> list[Timing]:
     """Return what a worker process answers; without an answer each timing says why."""
-    asked, beside = {one.id: one.case for one in cases}, own.beside(cases[0].problem)
+    asked, beside = {case.id: case.case for case in cases}, own.beside(cases[0].problem)
     request = Request(cases=asked, limits=limits, plan=plan, beside=beside, core=core, **part)
     with tempfile.TemporaryDirectory(prefix="hbvm-bench-") as scratch:
         caches = empty_caches(Path(scratch) / "caches") if plan.compilations > 1 else {}

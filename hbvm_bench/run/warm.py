@@ -178,17 +178,17 @@ def nest(environment: Mapping[str, str]) -> Iterator[Nest]:
     whole = {**os.environ, **environment}
     place = whole, Path.cwd(), machine.cores()
     with _lock:
-        found = next((one for one in _idle if one.place == place), None)
-        if found is not None:
-            _idle.remove(found)
-    found = found or _new(whole, place)
+        server = next((idle for idle in _idle if idle.place == place), None)
+        if server is not None:
+            _idle.remove(server)
+    server = server or _new(whole, place)
     try:
-        yield found
+        yield server
     except BaseException:
-        found.close()
+        server.close()
         raise
     with _lock:
-        _idle.append(found)
+        _idle.append(server)
 
 
 @atexit.register
@@ -300,7 +300,7 @@ def _is_alone() -> bool:
 
 
 def _resident() -> int:
-    return memory.of(os.getpid()).resident
+    return memory.of_process(os.getpid()).resident
 
 
 if __name__ == "__main__":

@@ -81,13 +81,13 @@ class Request(msgspec.Struct, frozen=True, kw_only=True):
     core: int | None = None
 
 
-def work(path: Path, parent: int, found: Found = "nothing") -> None:
+def work(path: Path, parent: int, warmth: Found = "nothing") -> None:
     """Do what the request at a path asks, as the only thing that this process does.
 
     It ends with ``parent``, which has made it. What it has ``found`` loaded, as a fork of it, is not counted.
     """
     request = msgspec.json.decode(path.read_bytes(), type=Request)
-    own.learn(request.beside)
+    own.add_known(request.beside)
     ending.limit_and_die_with(parent)
     if request.core is not None:
         machine.bind([request.core])
@@ -95,7 +95,7 @@ def work(path: Path, parent: int, found: Found = "nothing") -> None:
     warnings.simplefilter("error", np.exceptions.ComplexWarning)
     try:
         if request.plan is None:
-            reply: object = _measured(request, path.parent, parent, found)
+            reply: object = _measured(request, path.parent, parent, warmth)
         else:
             reply = _time(request, request.plan, path.parent)
         with atomic(path.parent / REPLY) as temporary:
@@ -106,12 +106,12 @@ def work(path: Path, parent: int, found: Found = "nothing") -> None:
         raise
 
 
-def _measured(request: Request, directory: Path, parent: int, found: Found) -> Result:
+def _measured(request: Request, directory: Path, parent: int, warmth: Found) -> Result:
     result = _measure(request, directory)
     if result.outcome not in ("ok", "stalled"):
         return result
-    compiled = None if found == "code" else result.compile  # else the seconds say nothing
-    return msgspec.structs.replace(result, compile=compiled, peak_gib=_peak_gib(parent, found))
+    compiled = None if warmth == "code" else result.compile  # else the seconds say nothing
+    return msgspec.structs.replace(result, compile=compiled, peak_gib=_peak_gib(parent, warmth))
 
 
 def _measure(request: Request, directory: Path) -> Result:
@@ -156,17 +156,17 @@ def _stored(directory: Path, result: Result, series: Series) -> Result:
     return result
 
 
-def _peak_gib(parent: int, found: Found) -> float:
+def _peak_gib(parent: int, warmth: Found) -> float:
     """Return the largest resident memory, with the pages of libraries that a fork has not touched."""
     untouched = 0
-    if found != "nothing":
-        theirs, ours = (memory.of(pid).files for pid in (parent, os.getpid()))
+    if warmth != "nothing":
+        theirs, ours = (memory.of_process(pid).files for pid in (parent, os.getpid()))
         untouched = theirs - ours
     return (memory.own_peak() + max(untouched, 0)) / 2**20
 
 
 def _time(request: Request, plan: TimingPlan, directory: Path) -> list[Timing]:
-    runs = [_run(one) for one in _resolved(request)]
+    runs = [_run(case) for case in _resolved(request)]
     (directory / COMPILED).touch()
     if plan.interleaved:
         return timing.time_together(runs, plan, request.rounds, request.compilation)
@@ -176,8 +176,8 @@ def _time(request: Request, plan: TimingPlan, directory: Path) -> list[Timing]:
 def _run(resolved: Resolved) -> Timeable:
     problem, method, program = resolved.problem, resolved.method, _compiled(resolved)
     if (asked := resolved.case.ensemble) is None:
-        return Run.of(problem, method, program)
-    return ensemble.EnsembleRun.of(problem, method, program, asked)
+        return Run.compiled(problem, method, program)
+    return ensemble.EnsembleRun.compiled(problem, method, program, asked)
 
 
 def _compiled(resolved: Resolved) -> Program:
@@ -190,10 +190,10 @@ def _compiled(resolved: Resolved) -> Program:
 
 
 def _resolved(request: Request) -> list[Resolved]:
-    found = [resolve(case) for case in request.cases.values()]
-    if [one.id for one in found] != list(request.cases):
+    cases = [resolve(case) for case in request.cases.values()]
+    if [resolved.id for resolved in cases] != list(request.cases):
         raise InputError(STALE)
-    return found
+    return cases
 
 
 def _garbage(solution: Solution, grid: np.ndarray) -> str:

@@ -58,7 +58,7 @@ class Array(msgspec.Struct, frozen=True, kw_only=True):
     data: bytes
 
     @classmethod
-    def of(cls, values: NDArray[np.float64]) -> "Array":
+    def packed(cls, values: NDArray[np.float64]) -> "Array":
         """Pack an array; all first bytes of its numbers stand together, which compresses."""
         numbers = np.ascontiguousarray(values, dtype=">f8")
         return cls(shape=list(values.shape), data=numbers.view(np.uint8).reshape(-1, 8).T.tobytes())
@@ -108,17 +108,17 @@ class Archive:
         """Return the series of a case that its page keeps, by name."""
         return self._series.get(case_id, {})
 
-    def learn(self) -> None:
+    def add_known(self) -> None:
         """Know the problems and references that are stored here, and no other run's."""
         solutions.forget()
         for known in self._beside:
-            own.learn(known)
+            own.add_known(known)
 
-    def of(self, records: list[Record]) -> "Archive":
+    def with_records(self, records: list[Record]) -> "Archive":
         """Return the run with some of its records only."""
-        made = copy(self)
-        made._records = records
-        return made
+        part = copy(self)
+        part._records = records
+        return part
 
     def beside(self) -> dict[str, Any]:
         """Return what a study keeps beside its cases, by name."""
@@ -126,7 +126,7 @@ class Archive:
 
     def index(self) -> Index:
         """Return what the run was asked to do."""
-        self.learn()
+        self.add_known()
         return self._index
 
     def records(self) -> list[Record]:
@@ -138,12 +138,14 @@ def table(
     index: Index, records: Sequence[Record], series: Mapping[str, Mapping[str, NDArray[np.float64]]]
 ) -> Table:
     """Return records, as `hbvm_bench.measure.reading` reads them, column by column, with series of them."""
-    kept = {key: {name: Array.of(v) for name, v in named.items()} for key, named in series.items() if named}
+    kept = {
+        key: {name: Array.packed(v) for name, v in named.items()} for key, named in series.items() if named
+    }
     rows = [msgspec.to_builtins(record) for record in records]
     columns = {name: [row[name] for row in rows] for name in Record.__struct_fields__}
     known = [own.beside(make_problem(text)) for text in dict.fromkeys(r.case.problem for r in records)]
     return Table(
-        index=index, columns=columns, series=kept, beside=[one for one in known if one != own.Beside()]
+        index=index, columns=columns, series=kept, beside=[entry for entry in known if entry != own.Beside()]
     )
 
 

@@ -30,18 +30,18 @@ class Kept(msgspec.Struct, frozen=True, kw_only=True):
     @staticmethod
     def machine_of(records: Sequence[Record]) -> dict[str, str | int]:
         """Return where records were timed, or else measured."""
-        timed = [one.timing.machine for one in records if one.timing is not None]
-        return (timed or [one.machine for one in records])[0]
+        timed = [record.timing.machine for record in records if record.timing is not None]
+        return (timed or [record.machine for record in records])[0]
 
     @property
     def versions(self) -> dict[str, str]:
         """Of all libraries."""
-        return {name: number for one in self.records for name, number in one.versions.items()}
+        return {name: number for record in self.records for name, number in record.versions.items()}
 
     @property
     def started(self) -> str:
         """When the first of its cases had ended."""
-        return min(one.finished for one in self.records)
+        return min(record.finished for record in self.records)
 
     @property
     def command(self) -> str:

@@ -41,13 +41,13 @@ def merge(runs: Sequence[Store], out: Store) -> tuple[int, int, int]:
             cases.setdefault(case_id, case)
     out.prepare()
     with out.locked():
-        made = left_out = 0
+        written = left_out = 0
         for case_id in cases:
-            found = [(record, run) for run in runs if (record := run.load(case_id)) is not None]
-            if found:
-                record, run = max(found, key=lambda pair: progress(pair[0]))
+            copies = [(record, run) for run in runs if (record := run.load(case_id)) is not None]
+            if copies:
+                record, run = max(copies, key=lambda pair: progress(pair[0]))
                 out.save(record, run.series_file(case_id) or None)
-                made += 1
+                written += 1
             else:
                 left_out += any(run.has(case_id) for run in runs)
         places = [shlex.quote(str(run.directory)) for run in runs]
@@ -59,7 +59,7 @@ def merge(runs: Sequence[Store], out: Store) -> tuple[int, int, int]:
             cases=list(cases.values()),
         )
         out.write_index(index)
-    return len(cases), made, left_out
+    return len(cases), written, left_out
 
 
 def stores(directories: Sequence[Path]) -> list[Store]:
@@ -89,7 +89,7 @@ def _together(campaigns: Sequence[Campaign]) -> Campaign:
 
 
 def _union(lists: Sequence[Sequence[T]]) -> list[T]:
-    made: list[T] = []
+    union: list[T] = []
     for items in lists:
-        made += [item for item in items if item not in made]
-    return made
+        union += [item for item in items if item not in union]
+    return union

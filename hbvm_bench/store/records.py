@@ -174,7 +174,7 @@ class Timing(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def samples(self) -> list[float]:
-        return [sample for one in self.rounds for sample in one.samples]
+        return [sample for round_ in self.rounds for sample in round_.samples]
 
     @property
     def summary(self) -> dict[str, float]:
@@ -188,12 +188,12 @@ class Timing(msgspec.Struct, frozen=True, kw_only=True):
     @property
     def share(self) -> float:
         """Return the least share of a core that a round had; 1 without rounds."""
-        return min((one.share for one in self.rounds), default=1.0)
+        return min((round_.share for round_ in self.rounds), default=1.0)
 
     @property
     def compile(self) -> Compile | None:
         """Return the compilation with the median seconds."""
-        compiles = sorted((one.compile for one in self.rounds), key=lambda c: c.seconds)
+        compiles = sorted((round_.compile for round_ in self.rounds), key=lambda c: c.seconds)
         return compiles[(len(compiles) - 1) // 2] if compiles else None
 
 
@@ -306,14 +306,14 @@ class Reading(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
 
     Attributes
     ----------
-    by : str
+    digest : str
         Digest of all that it depends on; see `hbvm_bench.measure.reading`.
     """
 
     metrics: dict[str, Value] = {}
     violation: str = ""
     laws: dict[str, Law] = {}
-    by: str = ""
+    digest: str = msgspec.field(default="", name="by")
 
 
 class Record(msgspec.Struct, frozen=True, kw_only=True):

@@ -187,12 +187,12 @@ class Store:
             (self.directory / PROBLEMS).mkdir(parents=True, exist_ok=True)
             write_json(self.directory / PROBLEMS / f"{name}.json", known)
 
-    def learn(self) -> None:
+    def add_known(self) -> None:
         """Know the problems and references that are stored here, and no other run's; no code is run."""
         solutions.forget()
         for path in (self.directory / PROBLEMS).glob("[!.]*.json"):
             with suppress(OSError, ValueError, LookupError, TypeError):  # damaged: whoever needs it says so
-                own.learn(decoded(path.read_bytes(), own.Beside))
+                own.add_known(decoded(path.read_bytes(), own.Beside))
 
     def goals(self) -> list[Goal]:
         """Return the goals of the run that is here, with their dates; none where there is no run."""
@@ -217,7 +217,7 @@ class Store:
             ) from None
         except OSError as error:
             raise InputError(f"cannot read {str(self.directory)!r}: {error.strerror}.") from None
-        self.learn()
+        self.add_known()
         try:
             index = decoded(content, Index)
             cases = index.cases or index.campaign.cases()
@@ -237,7 +237,7 @@ class Store:
         Labels and notes are the campaign's present ones: they are words, and no reason to run again.
         A record that cannot be read is one that says so.
         """
-        made: list[Record] = []
+        records: list[Record] = []
         index = self.index()
         for case_id, case in index.listed():
             try:
@@ -247,20 +247,20 @@ class Store:
             except FileNotFoundError:
                 continue
             except (OSError, ValueError) as error:
-                made.append(_unread(case_id, case, error, again(index, self.directory)))
+                records.append(_unread(case_id, case, error, again(index, self.directory)))
                 continue
             words = msgspec.structs.replace(record.case, settings=case.settings, note=case.note)
-            made.append(msgspec.structs.replace(record, case=words))
-        return made
+            records.append(msgspec.structs.replace(record, case=words))
+        return records
 
     def beside(self) -> dict[str, Any]:
         """Return what a study keeps beside its cases, by name: the other JSON files of the directory."""
-        found = {}
+        contents = {}
         for path in sorted(self.directory.glob("*.json")):
             if path.name != INDEX:
                 with suppress(OSError, ValueError):
-                    found[path.stem] = decoded(path.read_bytes(), object)
-        return found
+                    contents[path.stem] = decoded(path.read_bytes(), object)
+        return contents
 
     def everything(self) -> Iterator[Record]:
         """Yield all records in the directory, those of earlier versions and other settings too."""
@@ -297,7 +297,7 @@ def is_of(stored: Case, asked: Case) -> bool:
     )
     texts = (asked.problem, stored.problem, _problem), (asked.method, stored.method, _method)
     return words == stored and all(
-        ours == theirs or _prints_as(ours, theirs, by) for ours, theirs, by in texts
+        ours == theirs or _prints_as(ours, theirs, tolerance) for ours, theirs, tolerance in texts
     )
 
 
@@ -418,11 +418,11 @@ def decode_series(content: bytes) -> dict[str, NDArray[np.float64]]:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             if sum(member.file_size for member in archive.infolist()) > most:
                 return {}
-            found = {name.removesuffix(".npy"): _array(archive.read(name)) for name in archive.namelist()}
+            arrays = {name.removesuffix(".npy"): _array(archive.read(name)) for name in archive.namelist()}
     except Exception:  # zipfile and numpy raise a dozen kinds, and the content is a stranger's
         return {}
-    ours = all(NAME.fullmatch(name) and array.dtype.kind in "fiu" for name, array in found.items())
-    return found if ours else {}
+    ours = all(NAME.fullmatch(name) and array.dtype.kind in "fiu" for name, array in arrays.items())
+    return arrays if ours else {}
 
 
 @lru_cache(maxsize=128)  # a run's series are alike

@@ -68,7 +68,8 @@ class Duel:
         """``reached``, ``missed``, ``less accurate``, or why there is no ratio; ``""`` without a goal."""
         if self.ratio is None:
             return next(
-                (status_of(one) for one in (self.ours, self.theirs) if not one.timing), "not compared"
+                (status_of(record) for record in (self.ours, self.theirs) if not record.timing),
+                "not compared",
             )
         if not accurate(self.ours, standings.no_worse(self.theirs, NO_WORSE)):
             return "less accurate"
@@ -90,13 +91,13 @@ def campaign(names: Sequence[str], rounds: int | None = None) -> Campaign:
 
 def duels(run: Kept) -> list[Duel]:
     """Return what came out, problem by problem."""
-    campaign, found = run.index.campaign, []
+    campaign, result = run.index.campaign, []
     judged = {verdict.entry.use: verdict for verdict in verdicts(campaign, run.records)}
     for entry, records in standings.entries(campaign, run.records):
         ours, theirs = standings.among(records, ""), standings.among(records, AGAINST)
         if ours and theirs:
-            found.append(Duel(judged.get(entry.use), ours[0], theirs[0]))
-    return found
+            result.append(Duel(judged.get(entry.use), ours[0], theirs[0]))
+    return result
 
 
 METRICS = ("warm_seconds", "steps", "energy_max", "position_mean")
@@ -124,7 +125,7 @@ def ratios_by_kind(results: Results) -> list[Block]:
 def kinds(results: Results) -> list[Section]:
     """Return the numbers of each kind of processor."""
     return [
-        Section(kind, [one for run in runs for one in _run(run)], key=kind, nav=kind)
+        Section(kind, [part for run in runs for part in _run(run)], key=kind, nav=kind)
         for kind, runs in results.by_processor.items()
     ]
 
@@ -152,8 +153,8 @@ def ratios(results: Mapping[str, Sequence[Kept]]) -> Table:
         kind: {duel.problem: duel for run in runs for duel in duels(run)} for kind, runs in results.items()
     }
     rows = []
-    for key in dict.fromkeys(key for found in by_problem.values() for key in found):
-        of_kind = [found.get(key) for found in by_problem.values()]
+    for key in dict.fromkeys(key for duels_of in by_problem.values() for key in duels_of):
+        of_kind = [duels_of.get(key) for duels_of in by_problem.values()]
         known = [duel for duel in of_kind if duel is not None]
         goals = dict.fromkeys(duel.goal for duel in known)
         settings = dict.fromkeys(duel.theirs.case.method for duel in known)
@@ -171,14 +172,14 @@ def ratios(results: Mapping[str, Sequence[Kept]]) -> Table:
 @styled
 def ratios_drawn(results: Mapping[str, Sequence[Kept]]) -> Picture:
     """Draw the ratios, a line for each problem, with the goals."""
-    found = {kind: [duel for run in runs for duel in duels(run)] for kind, runs in results.items()}
-    problems = list(dict.fromkeys(duel.problem for members in found.values() for duel in members))
+    duels_of = {kind: [duel for run in runs for duel in duels(run)] for kind, runs in results.items()}
+    problems = list(dict.fromkeys(duel.problem for members in duels_of.values() for duel in members))
     height = {problem: len(problems) - i for i, problem in enumerate(problems)}
     figure = new(8.6, 0.9 + 0.36 * len(problems))
     axes = figure.add_axes((0.36, 0.6 / figure.get_figheight(), 0.6, 1 - 0.95 / figure.get_figheight()))
     axes.set_xscale("log")
     traces, said = [], []
-    for number, (kind, members) in enumerate(found.items(), 1):
+    for number, (kind, members) in enumerate(duels_of.items(), 1):
         shade, marker = base("HBVM")[0], "os^D"[(number - 1) % 4]
         known = [duel for duel in members if duel.ratio is not None]
         x = np.array([duel.ratio.median for duel in known if duel.ratio is not None])
@@ -203,7 +204,7 @@ def ratios_drawn(results: Mapping[str, Sequence[Kept]]) -> Picture:
     axes.set_ylim(0.4, len(problems) + 0.6)
     horizontal = Axis("time of the Taylor method relative to HBVM()", log=True)
     axes.set_xlabel(horizontal.label)
-    figure.legend(loc="upper right", ncols=len(found) + 1, fontsize=7)
+    figure.legend(loc="upper right", ncols=len(duels_of) + 1, fontsize=7)
     return picture(
         figure,
         "ratios",
@@ -222,10 +223,10 @@ def _cell(duel: Duel | None) -> str:
     return duel.words if duel.ratio is None else f"{duel.ratio.median:.2f}× {duel.words}".strip()
 
 
-def sides(found: Sequence[Duel]) -> Table:
+def sides(duels_: Sequence[Duel]) -> Table:
     """Return both sides' errors and times."""
     rows = []
-    for duel in found:
+    for duel in duels_:
         ratio = duel.ratio
         for first, side in ((True, duel.ours), (False, duel.theirs)):
             spread = ratio is not None and ratio.low is not None and f"{ratio.low:.2f} … {ratio.high:.2f}"

@@ -91,41 +91,43 @@ class Results:
     def __getitem__(self, name: str) -> Any:
         key = f"{self.part}/{name}"
         if key not in self.read:
-            pieces = [one for one in self.tasks if re.fullmatch(rf"{re.escape(key)} \d+", one)]
+            pieces = [piece for piece in self.tasks if re.fullmatch(rf"{re.escape(key)} \d+", piece)]
             whole = key in self.tasks or not pieces
-            self.read[key] = self._one(key) if whole else [row for one in pieces for row in self._one(one)]
+            self.read[key] = (
+                self._result(key) if whole else [row for piece in pieces for row in self._result(piece)]
+            )
         return self.read[key]
 
     def each(self, name: str, values: Iterable[Any]) -> dict[Any, Any]:
         """Return what the tasks of `each` returned, by their values."""
         return {value: self[f"{name} {value}"] for value in values}
 
-    def _one(self, key: str) -> Any:
+    def _result(self, key: str) -> Any:
         if key not in self.kept.results:
             raise InputError(f"the computation {key!r} {self.kept.failed.get(key, 'was not run')}.")
         return unpacked(self.kept.results[key], self.tasks[key].run)
 
 
-def claims_of(found: Sequence[tuple[Part, "Results"]], title: str, nav: str, given: str = "paper") -> Section:
+def claims_of(parts: Sequence[tuple[Part, "Results"]], title: str, nav: str, given: str = "paper") -> Section:
     """Return every claim of the parts with what was published, called ``given``, and what came out."""
 
-    def of(part: Part, results: Results) -> Claims:
+    def claims(part: Part, results: Results) -> Claims:
         return Claims([(part.title, part.key, part.claims(results))])
 
     makers = [
-        (f"the claims of {part.title}", functools.partial(of, part, results)) for part, results in found
+        (f"the claims of {part.title}", functools.partial(claims, part, results)) for part, results in parts
     ]
-    made = attempt(*makers)
-    groups = [group for one in made if isinstance(one, Claims) for group in one.groups if group[2]]
-    failed: list[Block] = [one for one in made if not isinstance(one, Claims)]
+    blocks = attempt(*makers)
+    groups = [group for block in blocks if isinstance(block, Claims) for group in block.groups if group[2]]
+    failed: list[Block] = [block for block in blocks if not isinstance(block, Claims)]
     return Section(title, [Claims(groups, given), *failed], "all-claims", nav=nav)
 
 
-def sections_of(found: Sequence[tuple[Part, "Results"]]) -> list[Section]:
+def sections_of(parts: Sequence[tuple[Part, "Results"]]) -> list[Section]:
     """Return the section of each part."""
     return [
         Section(part.title, attempt(*part.blocks(results)), part.key, nav=part.title)
-        for part, results in found
+        for part, results in parts
     ]
 
 

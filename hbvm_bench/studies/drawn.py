@@ -51,13 +51,13 @@ def drawn(
     def decorate(draw: Callable[Concatenate[Figure, P], Said]) -> Callable[P, Picture]:
         @styled
         @wraps(draw)
-        def made(*args: P.args, **kwargs: P.kwargs) -> Picture:
+        def draw_picture(*args: P.args, **kwargs: P.kwargs) -> Picture:
             figure = new(width, height)
             figure.set_layout_engine("constrained")
             caption, summary = draw(figure, *args, **kwargs)
             return picture(figure, key, title, caption, summary, values=values)
 
-        return made
+        return draw_picture
 
     return decorate
 

@@ -73,7 +73,7 @@ class Endurance:
     @property
     def methods(self) -> list[str]:
         """The methods, as they print."""
-        return [one.case.method for one in self.run.records]
+        return [record.case.method for record in self.run.records]
 
 
 def campaign(
@@ -83,27 +83,29 @@ def campaign(
 
     The goals are about a million years and are left out of shorter runs.
     """
-    made = load(NAME)
-    (entry,) = made.entries()
+    loaded = load(NAME)
+    (entry,) = loaded.entries()
     if years is not None:
-        made = replace(made, problems=[replace(entry, values={"years": years})])
-        made = made if years >= DECADES[-1] else replace(made, goals=[])
+        loaded = replace(loaded, problems=[replace(entry, values={"years": years})])
+        loaded = loaded if years >= DECADES[-1] else replace(loaded, goals=[])
     if starts is not None:
-        made = replace(made, checks=replace(made.checks, starts=starts))
+        loaded = replace(loaded, checks=replace(loaded.checks, starts=starts))
     if methods:
-        made = replace(made, methods=[replace(made.methods[0], use=list(methods))])
-    return made
+        loaded = replace(loaded, methods=[replace(loaded.methods[0], use=list(methods))])
+    return loaded
 
 
-def of(results: Results) -> Endurance:
+def measured_last(results: Results) -> Endurance:
     """Return the run that was measured last."""
     run = results.runs[-1]
-    series = {one.case.method: results.series.get(one.id, {}) for one in run.records}
-    times = [one["drift.t"] for one in series.values() if "drift.t" in one]
+    series = {record.case.method: results.series.get(record.id, {}) for record in run.records}
+    times = [record["drift.t"] for record in series.values() if "drift.t" in record]
     return Endurance(
         run,
         t=times[0] if times else np.empty(0),
-        errors={method: one["drift.energy"] for method, one in series.items() if "drift.energy" in one},
+        errors={
+            method: record["drift.energy"] for method, record in series.items() if "drift.energy" in record
+        },
     )
 
 
@@ -140,12 +142,12 @@ def lines(result: Endurance) -> list[Line]:
     """Return one line per method, in the order of declaration."""
     ours = standings.best(standings.among(result.run.records, ""), {})
     years = sorted({*DECADES, result.years}.intersection(result.t.tolist()))
-    made = []
+    result_lines = []
     for record in result.run.records:
         errors = result.errors.get(record.case.method, np.empty((0, 0)))
         rms = drift.rms(errors[:, np.isin(result.t, years)]).tolist() if errors.size else []
         ratio = standings.compare(ours, record, chosen=True).ratio
-        made.append(
+        result_lines.append(
             Line(
                 method=record.case.method,
                 starts=len(errors),
@@ -156,7 +158,7 @@ def lines(result: Endurance) -> list[Line]:
                 times_ours=ratio.median if ratio else None,
             )
         )
-    return made
+    return result_lines
 
 
 def goals(result: Endurance) -> list[Verdict]:
@@ -178,7 +180,7 @@ growth: a floor and a power of t are fitted together to the logarithm of the rms
 @block
 def about(results: Results) -> str:
     """Return what was run."""
-    result = of(results)
+    result = measured_last(results)
     return (
         f"`{result.problem}` from {result.starts} initial conditions: the problem's, and others in which "
         f"every position and momentum is changed by up to {PERTURBATION} of itself "
@@ -189,7 +191,7 @@ def about(results: Results) -> str:
 @block
 def measured_on(results: Results) -> Note:
     """Return on what machine, and what else it did."""
-    run = of(results).run
+    run = measured_last(results).run
     return Note(
         " ".join(
             [
@@ -204,13 +206,13 @@ def measured_on(results: Results) -> Note:
 @block
 def errors_and_goals(results: Results) -> list[Table]:
     """Return the tables: the errors with their laws, and the goals."""
-    return tables(of(results))
+    return tables(measured_last(results))
 
 
 @block
 def energy_over_time(results: Results) -> Picture | None:
     """Draw the rms over the starts against time."""
-    return over_time(of(results), results.look)
+    return over_time(measured_last(results), results.look)
 
 
 @block
@@ -223,16 +225,16 @@ def how(results: Results) -> Note:
 @block
 def run_again(results: Results) -> Section:
     """Return the command, and what was measured with what."""
-    run = of(results).run
+    run = measured_last(results).run
     return again(run.command, run.started[:10], run.machine, run.versions)
 
 
 def tables(result: Endurance) -> list[Table]:
     """Return the tables: the errors with their laws, and the goals."""
-    found = lines(result)
-    years = sorted({year for line in found for year in line.rms})
+    shown = lines(result)
+    years = sorted({year for line in shown for year in line.rms})
     rows = []
-    for line in found:
+    for line in shown:
         law = line.drift
         rows.append(
             (
@@ -249,7 +251,7 @@ def tables(result: Endurance) -> list[Table]:
         )
     heads = tuple(f"{year:g}" for year in years)
     after = ("growth", "power of t", "mean", "a year", "time", "× HBVM and Gauss")
-    made = [
+    tables_ = [
         Table(
             f"Relative energy error over {result.years:g} years",
             ("method", "starts", *heads, *after),
@@ -267,8 +269,8 @@ def tables(result: Endurance) -> list[Table]:
         )
     ]
     if asked := goals(result):
-        made.append(goals_table(asked))
-    return made
+        tables_.append(goals_table(asked))
+    return tables_
 
 
 def _named(law: Law) -> str:
@@ -305,7 +307,7 @@ def over_time(result: Endurance, look: Mapping[str, Look]) -> Picture | None:
     figure.subplots_adjust(left=0.08, right=0.94, top=0.94, bottom=0.1)
     log_axis(axes, "x", math.floor(math.log10(t[0])), math.ceil(math.log10(t[-1])))
     log_axis(axes, "y", low, max(high, low + 1))
-    found, traces = {line.method: line for line in lines(result)}, []
+    line_of, traces = {line.method: line for line in lines(result)}, []
     for (method, errors), rms in zip(shown, values, strict=True):
         number, colour, dash = look[method].number, look[method].light, look[method].dash
         for row in np.abs(errors):
@@ -322,7 +324,7 @@ def over_time(result: Endurance, look: Mapping[str, Look]) -> Picture | None:
             label=method,
         )
         traces.append(Trace(number, method, t, np.where(rms > 0.0, rms, np.nan)))
-        law = found[method].drift
+        law = line_of[method].drift
         if law is not None and law.law is not None:
             at = np.geomspace(t[-1] / FALLS_ON, t[-1], LAW_POINTS)
             traces.append(Trace(number, method, at, drift.curve(law, at), "law", drift.LAWS[law.law]))
@@ -334,7 +336,7 @@ def over_time(result: Endurance, look: Mapping[str, Look]) -> Picture | None:
     axes.legend(loc="upper left", handlelength=4.5)
     said = "; ".join(
         f"{line.method}: {', '.join(f'{value:.1e} at {year:g} years' for year, value in line.rms.items())}"
-        for line in found.values()
+        for line in line_of.values()
     )
     vertical = Axis("rms of the relative energy error", log=True)
     return picture(

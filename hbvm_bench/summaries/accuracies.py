@@ -20,11 +20,11 @@ def table(campaign: Campaign, records: Sequence[Record]) -> Table | None:
 
     ``None`` where no setting was timed that is accurate to any level.
     """
-    found = [(standings.title_of(entry), here) for entry, here in standings.entries(campaign, records)]
-    peers = list(by_family([one for _, here in found for one in here if one.role != "ours"]))
+    titled = [(standings.title_of(entry), here) for entry, here in standings.entries(campaign, records)]
+    peers = list(by_family([record for _, here in titled for record in here if record.role != "ours"]))
     rows = [
         (title, f"{level:g}", *_cells(here, level, peers))
-        for title, here in found
+        for title, here in titled
         for level in LEVELS
         if _fastest(here, level) is not None
     ]
@@ -62,4 +62,4 @@ def _fastest(records: Sequence[Record], level: float) -> Record | None:
 
 
 def _time(record: Record) -> str:
-    return seconds(Spread.of([*standings.by_round(record).values()]).median)
+    return seconds(Spread.from_samples([*standings.by_round(record).values()]).median)

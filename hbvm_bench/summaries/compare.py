@@ -33,7 +33,7 @@ class Change:
 
     problem: str
     method: str
-    what: str  # a metric's label, ``"outcome"`` or ``"time"``
+    quantity: str  # a metric's label, ``"outcome"`` or ``"time"``
     before: str
     after: str
 
@@ -72,18 +72,18 @@ def compare(first: Store, second: Store) -> Comparison:
     problems.errors.InputError
         If a directory holds no run.
     """
-    one, other = _by_case(reading.records(first)), _by_case(reading.records(second))
-    both = [(record, other[key]) for key, record in one.items() if key in other]
-    found = Comparison(
+    first_records, other = _by_case(reading.records(first)), _by_case(reading.records(second))
+    both = [(record, other[key]) for key, record in first_records.items() if key in other]
+    comparison = Comparison(
         cases=len(both),
-        only_first=[_name(record.case) for key, record in one.items() if key not in other],
-        only_second=[_name(record.case) for key, record in other.items() if key not in one],
+        only_first=[_name(record.case) for key, record in first_records.items() if key not in other],
+        only_second=[_name(record.case) for key, record in other.items() if key not in first_records],
         behind=_behind(both),
     )
     for before, after in both:
-        _compare_numbers(before, after, found)
-    _compare_times(both, found)
-    return found
+        _compare_numbers(before, after, comparison)
+    _compare_times(both, comparison)
+    return comparison
 
 
 def _by_case(records: Sequence[Record]) -> dict[bytes, Record]:
@@ -96,40 +96,40 @@ def _name(case: Case) -> str:
 
 
 def _behind(both: Sequence[tuple[Record, Record]]) -> list[str]:
-    found: list[str] = []
+    reasons: list[str] = []
     for before, after in both:
         for name in sorted(before.versions.keys() | after.versions.keys()):
             was, now = before.versions.get(name, "none"), after.versions.get(name, "none")
-            found += [f"{name} {was} → {now}"] if was != now else []
+            reasons += [f"{name} {was} → {now}"] if was != now else []
         if before.versions == after.versions and before.id != after.id:
-            found.append("the sources of hbvm-bench or of a method")
+            reasons.append("the sources of hbvm-bench or of a method")
         for name, was in before.machine.items():
             if (now := after.machine.get(name, was)) != was and name not in machine.MEASURED:
-                found.append(f"{name.replace('_', ' ')} {was} → {now}")
-    return list(dict.fromkeys(found))
+                reasons.append(f"{name.replace('_', ' ')} {was} → {now}")
+    return list(dict.fromkeys(reasons))
 
 
-def _compare_numbers(before: Record, after: Record, found: Comparison) -> None:
+def _compare_numbers(before: Record, after: Record, comparison: Comparison) -> None:
     strict = before.id == after.id and machine.same(before.machine, after.machine)
 
-    def differs(what: str, was: str, now: str) -> None:
-        found.changed.append(Change(before.case.problem, before.case.method, what, was, now))
+    def differs(label: str, was: str, now: str) -> None:
+        comparison.changed.append(Change(before.case.problem, before.case.method, label, was, now))
 
     lost = (", on another trajectory" * bool(record.result.violation) for record in (before, after))
     was, now = (status_of(record) + words for record, words in zip((before, after), lost, strict=True))
     if was != now:
         differs("outcome", was, now)
-    one, other = before.result.metrics, after.result.metrics
+    metrics_before, other = before.result.metrics, after.result.metrics
     for key, metric in METRICS.items():
-        if metric.unit in COSTS or not (key in one or key in other):
+        if metric.unit in COSTS or not (key in metrics_before or key in other):
             continue
-        a, b = one.get(key, Value()), other.get(key, Value())
+        a, b = metrics_before.get(key, Value()), other.get(key, Value())
         if a.value == b.value and a.void == b.void:
-            found.equal += 1
+            comparison.equal += 1
         elif a.value is None or b.value is None or a.void != b.void:
             differs(metric.label, _shown(metric, a), _shown(metric, b))
         elif not strict and _is_rounding(metric, a.value, b.value):
-            found.rounded += 1
+            comparison.rounded += 1
         else:
             differs(metric.label, f"{a.value:.17g}", f"{b.value:.17g}")
 
@@ -148,28 +148,30 @@ def _is_rounding(metric: Metric, a: float, b: float) -> bool:
     return large <= ROUNDING and large <= ROUNDING_FACTOR * max(small, sys.float_info.epsilon)
 
 
-def _compare_times(both: Sequence[tuple[Record, Record]], found: Comparison) -> None:
+def _compare_times(both: Sequence[tuple[Record, Record]], comparison: Comparison) -> None:
     pairs: list[tuple[Record, Record, list[float], list[float]]] = []
     for before, after in both:
         why = next(_untimed((before, after)), "")
         if why:
-            found.untimed.append(f"{_name(before.case)}: {why}")
+            comparison.untimed.append(f"{_name(before.case)}: {why}")
         elif before.timing and after.timing:
             pairs.append((before, after, _logarithms(before), _logarithms(after)))
-    found.timed = len(pairs)
+    comparison.timed = len(pairs)
     if not pairs:
         return
-    common = _typical_variance([logs for *_, one, other in pairs for logs in (one, other)])
-    doubts = [max(math.log(SMALLEST_RATIO), _doubt(one, other, common)) for *_, one, other in pairs]
-    found.noise = math.exp(median(doubts))
-    for (before, after, one, other), doubt in zip(pairs, doubts, strict=True):
-        shift = fmean(other) - fmean(one)
+    common = _typical_variance([logs for *_, first_logs, other in pairs for logs in (first_logs, other)])
+    doubts = [
+        max(math.log(SMALLEST_RATIO), _doubt(first_logs, other, common)) for *_, first_logs, other in pairs
+    ]
+    comparison.noise = math.exp(median(doubts))
+    for (before, after, first_logs, other), doubt in zip(pairs, doubts, strict=True):
+        shift = fmean(other) - fmean(first_logs)
         if abs(shift) <= doubt:
             continue
         was, now = (seconds(record.timing.summary["median"]) for record in (before, after) if record.timing)
         case, said = before.case, f"{now}, {math.exp(shift):.2f} times as long"
         change = Change(case.problem, case.method, "time", was, said)
-        (found.slower if shift > 0 else found.faster).append(change)
+        (comparison.slower if shift > 0 else comparison.faster).append(change)
 
 
 def _untimed(records: Sequence[Record]) -> Iterator[str]:
@@ -180,7 +182,7 @@ def _untimed(records: Sequence[Record]) -> Iterator[str]:
                 yield timing.why
             elif any(other.timing and other.timing.rounds for other in records):
                 yield "timed in one run only"
-        elif not all(one.calibration for one in timing.rounds):
+        elif not all(round_.calibration for round_ in timing.rounds):
             yield "taken without the calibration"
         elif timing.share < LEAST_SHARE:
             yield f"a round had only {timing.share:.0%} of a core"
@@ -189,7 +191,7 @@ def _untimed(records: Sequence[Record]) -> Iterator[str]:
 def _logarithms(record: Record) -> list[float]:
     """Return the logarithm of each round's median time in units of the calibration."""
     assert record.timing is not None
-    return [math.log(median(one.calibrated)) for one in record.timing.rounds]
+    return [math.log(median(round_.calibrated)) for round_ in record.timing.rounds]
 
 
 def _typical_variance(groups: Sequence[Sequence[float]]) -> float:
@@ -202,6 +204,6 @@ def _typical_variance(groups: Sequence[Sequence[float]]) -> float:
     return median(scaled) if scaled else 0.0
 
 
-def _doubt(one: Sequence[float], other: Sequence[float], common: float) -> float:
-    own = ((variance(group) if len(group) > 1 else 0.0, len(group)) for group in (one, other))
+def _doubt(first: Sequence[float], other: Sequence[float], common: float) -> float:
+    own = ((variance(group) if len(group) > 1 else 0.0, len(group)) for group in (first, other))
     return DEVIATIONS * math.sqrt(sum(max(scatter, common) / count for scatter, count in own))

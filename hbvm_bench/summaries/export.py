@@ -47,10 +47,10 @@ def export(stores: Sequence[Store] | Sequence[Archive], path: Path, table: str =
         raise InputError(f"{str(path)!r} must end in {' or '.join(FORMATS)}.")
     if table == "series" and any(isinstance(store, Archive) for store in stores):
         raise InputError(f"{str(stores[0].directory)!r} is an archive, which has no series; export a run.")
-    chosen, found, count = TABLES[table], [(store, reading.records(store)) for store in stores], 0
+    chosen, stored, count = TABLES[table], [(store, reading.records(store)) for store in stores], 0
     writer = _csv if path.suffix == ".csv" else _parquet
     with atomic(path) as temporary, writer(temporary, chosen.columns) as write:
-        for store, records in found:
+        for store, records in stored:
             for record in records:
                 rows = list(chosen.rows(record, cast(Store, store)))
                 write(rows)
@@ -115,10 +115,10 @@ def _case(record: Record) -> Row:
 
 def _timings(record: Record, store: Store) -> Iterator[Row]:
     del store
-    for number, one in enumerate(record.timing.rounds if record.timing else []):
-        calibration = median(one.calibration) if one.calibration else None
-        rest = (one.repeats, calibration, one.share, one.compile.seconds, one.compile.cached)
-        for sample, seconds in enumerate(one.samples):
+    for number, round_ in enumerate(record.timing.rounds if record.timing else []):
+        calibration = median(round_.calibration) if round_.calibration else None
+        rest = (round_.repeats, calibration, round_.share, round_.compile.seconds, round_.compile.cached)
+        for sample, seconds in enumerate(round_.samples):
             yield (*_key(record), number, sample, seconds, *rest)
 
 
@@ -151,20 +151,20 @@ def _timed(value: Callable[[Timing], Any]) -> Callable[[Record], Any]:
 def _metric(key: str) -> dict[str, tuple[type, Callable[[Record], Any]]]:
     """Return the three columns of a metric."""
 
-    def found(record: Record) -> Value:
+    def evaluated(record: Record) -> Value:
         return record.result.metrics.get(key, Value())
 
     def number(record: Record) -> float | None:
-        value = found(record).value
+        value = evaluated(record).value
         return None if value is None else float(value)
 
-    void, why = (lambda record: found(record).void), (lambda record: found(record).why)
+    void, why = (lambda record: evaluated(record).void), (lambda record: evaluated(record).why)
     return {key: (float, number), f"{key}_void": (bool, void), f"{key}_why": (str, why)}
 
 
 def _calibration(timing: Timing) -> float | None:
-    found = [seconds for one in timing.rounds for seconds in one.calibration]
-    return median(found) if found else None
+    samples = [seconds for round_ in timing.rounds for seconds in round_.calibration]
+    return median(samples) if samples else None
 
 
 CASES: dict[str, tuple[type, Callable[[Record], Any]]] = {

@@ -120,39 +120,43 @@ def _describe(name: str, problem: Problem) -> Findings:
     )
 
 
-def lines(found: Findings) -> list[tuple[str, str]]:
+def lines(findings: Findings) -> list[tuple[str, str]]:
     """Return the findings as pairs of a heading and a sentence."""
-    canonical = found.kind == "hamiltonian"
-    freedom = f"{found.dimension // 2} degrees of freedom, " if canonical else ""
-    momenta = ", ".join(f"{name.replace('q', 'p')} is constant" for name in found.cyclic)
-    cyclic = f"{', '.join(found.cyclic)}: {momenta}" if momenta else "none"
+    canonical = findings.kind == "hamiltonian"
+    freedom = f"{findings.dimension // 2} degrees of freedom, " if canonical else ""
+    momenta = ", ".join(f"{name.replace('q', 'p')} is constant" for name in findings.cyclic)
+    cyclic = f"{', '.join(findings.cyclic)}: {momenta}" if momenta else "none"
     separable = (
         "yes: H = sum of c p^2/2 + V(q), the second-order form applies"
-        if found.separable
+        if findings.separable
         else "no: the first-order form applies"
     )
-    accepted = ", ".join(name for name, reason in found.engines.items() if reason is None)
+    accepted = ", ".join(name for name, reason in findings.engines.items() if reason is None)
     rows = [
-        ("system", f"{KINDS[found.kind]}; {freedom}{found.dimension} unknowns"),
-        ("H", found.formula),
-        ("parameters", ", ".join(f"{name} = {value!r}" for name, value in found.parameters.items())),
+        ("system", f"{KINDS[findings.kind]}; {freedom}{findings.dimension} unknowns"),
+        ("H", findings.formula),
+        ("parameters", ", ".join(f"{name} = {value!r}" for name, value in findings.parameters.items())),
         ("separable", separable if canonical else ""),
-        ("polynomial", _polynomial(found) if found.kind != "vector_field" else ""),
+        ("polynomial", _polynomial(findings) if findings.kind != "vector_field" else ""),
         ("cyclic coordinates", cyclic if canonical else ""),
-        ("time", "occurs: the energy is not conserved" if found.depends_on_time else "does not occur"),
-        ("invariants", ", ".join(found.invariants) or "none known"),
-        ("stays 0 by symmetry", ", ".join(found.guards)),
+        ("time", "occurs: the energy is not conserved" if findings.depends_on_time else "does not occur"),
+        ("invariants", ", ".join(findings.invariants) or "none known"),
+        ("stays 0 by symmetry", ", ".join(findings.guards)),
         ("engines", accepted),
-        *(("not for", f"{name}: {reason}") for name, reason in found.engines.items() if reason is not None),
+        *(
+            ("not for", f"{name}: {reason}")
+            for name, reason in findings.engines.items()
+            if reason is not None
+        ),
     ]
     return [row for row in rows if row[1]]
 
 
-def _polynomial(found: Findings) -> str:
-    if found.degree is None:
+def _polynomial(findings: Findings) -> str:
+    if findings.degree is None:
         return "not polynomial: the energy is conserved to round-off once k is large enough, never exactly"
-    pairs = ", ".join(f"k = {k} for s = {s}" for s, k in found.exact)
-    return f"degree {found.degree}: HBVM(k, s) conserves the energy exactly from {pairs}"
+    pairs = ", ".join(f"k = {k} for s = {s}" for s, k in findings.exact)
+    return f"degree {findings.degree}: HBVM(k, s) conserves the energy exactly from {pairs}"
 
 
 def reasons(problem: Problem) -> dict[str, str | None]:

@@ -69,22 +69,29 @@ def verdicts(campaign: Campaign, records: Sequence[Record]) -> list[Verdict]:
     ]
 
 
-def table(found: Sequence[Verdict]) -> Table:
+def table(judged: Sequence[Verdict]) -> Table:
     """Return the goals as a table."""
     return Table(
         "Goals",
         ("problem", "goal", "declared", "asked", "measured", "verdict"),
         [
-            (standings.title_of(one.entry), one.words, one.declared, one.asked, one.measured, said(one))
-            for one in found
+            (
+                standings.title_of(verdict.entry),
+                verdict.words,
+                verdict.declared,
+                verdict.asked,
+                verdict.measured,
+                said(verdict),
+            )
+            for verdict in judged
         ],
         words=(0, 1, 2, 5),
     )
 
 
-def said(found: Verdict) -> str:
+def said(verdict: Verdict) -> str:
     """Return the verdict, with the reason where there is one."""
-    return f"{found.verdict}: {found.why}" if found.why else found.verdict
+    return f"{verdict.verdict}: {verdict.why}" if verdict.why else verdict.verdict
 
 
 def is_after(date: str, other: str) -> bool:
@@ -95,11 +102,11 @@ def is_after(date: str, other: str) -> bool:
 
 def disturbed(goal: Goal, records: Sequence[Record | None]) -> str:
     """Return why a speed is not judged: other work while its times were taken; else ``""``."""
-    timings = [one.timing for one in records if one is not None and one.timing is not None]
+    timings = [item.timing for item in records if item is not None and item.timing is not None]
     if goal.metric not in TIMES or not timings:
         return ""
-    loads = [one.load for one in timings if one.load is not None]
-    shares = [1.0 - median(round_.share for round_ in one.rounds) for one in timings if one.rounds]
+    loads = [item.load for item in timings if item.load is not None]
+    shares = [1.0 - median(round_.share for round_ in item.rounds) for item in timings if item.rounds]
     most = max([0.0, *shares, *(max(load.others, load.stolen) for load in loads)])
     return f"other work took {most:.0%} of a core during the timing" if most > OTHER_WORK else ""
 
@@ -114,7 +121,9 @@ def _judged(goal: Goal, entry: ProblemEntry, records: Sequence[Record]) -> Verdi
     ours = standings.best(able, goal.within, goal.metric)
     reached = ours is not None and (number(ours, goal.metric) or 0.0) <= goal.at
     busy = disturbed(goal, [ours])
-    missing = (one.result.metrics[goal.metric].why for one in able if goal.metric in one.result.metrics)
+    missing = (
+        record.result.metrics[goal.metric].why for record in able if goal.metric in record.result.metrics
+    )
     return Verdict(
         goal=goal,
         entry=entry,
@@ -132,26 +141,26 @@ def _against(goal: Goal, entry: ProblemEntry, records: Sequence[Record], ratio: 
     within = goal.within if goal.within or goal.no_worse else entry.within
     able = standings.among(records, goal.method), standings.among(records, goal.against)
     theirs = standings.best(able[1], within, goal.metric)
-    found = Comparison(None, None)
+    comparison = Comparison(None, None)
     if theirs is not None:
         allowed = standings.no_worse(theirs, goal.no_worse)
         allowed |= {key: min(bound, allowed.get(key, bound)) for key, bound in within.items()}
         ours = standings.best(able[0], allowed, goal.metric)
-        found = standings.compare(ours, theirs, goal.metric, chosen=max(map(len, able)) > 1)
+        comparison = standings.compare(ours, theirs, goal.metric, chosen=max(map(len, able)) > 1)
     blind = not goal.alone and not any(key.startswith(PLACE) for key in (*within, *goal.no_worse))
-    reached = found.ratio is not None and found.ratio.median >= ratio
+    reached = comparison.ratio is not None and comparison.ratio.median >= ratio
     verdict, why = "reached" if reached else "missed", ""
     if blind:
         verdict, why = "void", "energy is not ranked without position"
-    elif found.ratio is None:
+    elif comparison.ratio is None:
         why = (
             "no setting of the other library is as accurate"
             if theirs is None
             else "no setting of HBVM and Gauss is as accurate"
         )
-    elif busy := disturbed(goal, [found.ours, found.theirs]):
+    elif busy := disturbed(goal, [comparison.ours, comparison.theirs]):
         verdict, why = "not judged", busy
-    elif found.chosen_by_them:
+    elif comparison.chosen_by_them:
         why = "from the rounds that chose the settings: there are no others"
     label = METRICS[goal.metric].label
     return Verdict(
@@ -159,10 +168,10 @@ def _against(goal: Goal, entry: ProblemEntry, records: Sequence[Record], ratio: 
         entry=entry,
         words=goal.words or f"{label} of {goal.against} relative to HBVM and Gauss, {_bounds(goal, within)}",
         asked=f"≥ {ratio:g}",
-        measured=ratio_text(found.ratio),
+        measured=ratio_text(comparison.ratio),
         verdict=verdict,
         why=why,
-        comparison=found,
+        comparison=comparison,
         records=records,
     )
 
@@ -189,26 +198,30 @@ def _number(value: float) -> str:
     return f"{value:.0f}" if value >= 99.5 else f"{value:.1f}" if value >= 9.95 else f"{value:.2f}"
 
 
-def as_data(found: Sequence[Verdict]) -> list[dict[str, object]]:
+def as_data(judged: Sequence[Verdict]) -> list[dict[str, object]]:
     """Return the verdicts as plain data for JSON."""
     return [
-        {"problem": name_of(one.entry), "words": one.words, "goal": msgspec.to_builtins(one.goal)}
+        {"problem": name_of(verdict.entry), "words": verdict.words, "goal": msgspec.to_builtins(verdict.goal)}
         | {
-            "declared": one.declared,
-            "verdict": one.verdict,
-            "why": one.why,
-            "measured": one.measured,
-            **ratio_data(one.comparison),
+            "declared": verdict.declared,
+            "verdict": verdict.verdict,
+            "why": verdict.why,
+            "measured": verdict.measured,
+            **ratio_data(verdict.comparison),
         }
-        for one in found
+        for verdict in judged
     ]
 
 
-def ratio_data(found: Comparison) -> dict[str, object]:
+def ratio_data(comparison: Comparison) -> dict[str, object]:
     """Return a comparison as plain data for JSON."""
-    low, high = (found.ratio.low, found.ratio.high) if found.ratio else (None, None)
-    data: dict[str, object] = {"ratio": found.ratio and found.ratio.median, "low": low, "high": high}
-    for name, record in (("ours", found.ours), ("theirs", found.theirs)):
+    low, high = (comparison.ratio.low, comparison.ratio.high) if comparison.ratio else (None, None)
+    data: dict[str, object] = {
+        "ratio": comparison.ratio and comparison.ratio.median,
+        "low": low,
+        "high": high,
+    }
+    for name, record in (("ours", comparison.ours), ("theirs", comparison.theirs)):
         data[name] = record.case.method if record else None
         data[f"{name}_seconds"] = number(record, standings.TIME) if record else None
     return data

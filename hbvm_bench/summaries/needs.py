@@ -49,8 +49,8 @@ def table(records: Sequence[Record]) -> Table | None:
     for need in needs(records):
         behind = factors(records, need)
         problems = len(next(iter(behind.values()), ()))
-        near = {family: sum(factor <= need.near for factor in found) for family, found in behind.items()}
-        typical = {family: median(filter(math.isfinite, found)) for family, found in behind.items()}
+        near = {family: sum(factor <= need.near for factor in values) for family, values in behind.items()}
+        typical = {family: median(filter(math.isfinite, values)) for family, values in behind.items()}
         first = sorted(behind, key=lambda family: (-near[family], typical[family]))[:SHOWN]
         said = [
             f"{family} ({near[family]} of {_ran(behind[family])}"
@@ -115,8 +115,8 @@ def factors(records: Sequence[Record], need: Need) -> Mapping[str, list[float]]:
     Infinite where it does not serve, and NaN where it did not run, or has no such cost (a Taylor method
     counts no evaluations); families that serve nowhere are left out.
     """
-    found = _of_all(records, need)
-    return {family: ratios for family, ratios in found.items() if any(map(math.isfinite, ratios))}
+    ratios_of = _of_all(records, need)
+    return {family: ratios for family, ratios in ratios_of.items() if any(map(math.isfinite, ratios))}
 
 
 def _of_all(records: Sequence[Record], need: Need) -> dict[str, list[float]]:
@@ -126,11 +126,11 @@ def _of_all(records: Sequence[Record], need: Need) -> dict[str, list[float]]:
         costs: dict[str, float] = {}
         families |= dict.fromkeys(map(family_of, here))
         for family, members in by_family(here).items():
-            able = [one for one in members if need.serves(one)]
-            known = [cost for one in able if (cost := number(one, need.cost)) is not None]
+            able = [record for record in members if need.serves(record)]
+            known = [cost for record in able if (cost := number(record, need.cost)) is not None]
             if known:
                 costs[family] = max(min(known), need.floor)
-            elif not able and any(one.result.outcome != "refused" for one in members):
+            elif not able and any(record.result.outcome != "refused" for record in members):
                 costs[family] = math.inf
         least = min(costs.values(), default=math.inf)
         if math.isfinite(least):

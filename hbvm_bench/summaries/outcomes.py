@@ -44,30 +44,30 @@ def matrix(records: Sequence[Record]) -> tuple[list[str], dict[str, dict[str, Ou
 
 def table(records: Sequence[Record]) -> tuple[Table, list[str]] | None:
     """Return the matrix as a table, with the reasons; ``None`` for one problem alone."""
-    families, found = matrix(records)
-    if len(found) < 2:
+    families, rows = matrix(records)
+    if len(rows) < 2:
         return None
     reasons = [
         f"{short_name(problem)}, {family}: {reason}"
-        for problem, row in found.items()
-        for family, one in row.items()
-        for reason in one.reasons
+        for problem, row in rows.items()
+        for family, outcome in row.items()
+        for reason in outcome.reasons
         if reason
     ]
-    made = Table(
+    result = Table(
         "Which integrator on which problem",
         ("problem", *families),
-        [(short_name(problem), *map(_sign, row.values())) for problem, row in found.items()],
+        [(short_name(problem), *map(_sign, row.values())) for problem, row in rows.items()],
         "● reached the end on its trajectory; ◑ with a large position error; ◎ without a reference "
         "solution; ◐ lost the symmetry or the energy; ○ did not reach the end; – refused. Numbers: how "
         "many of its settings reached the end, where not all did.",
     )
-    return made, reasons
+    return result, reasons
 
 
-def _sign(one: Outcome) -> str:
-    some = 0 < one.reached < one.settings
-    return SIGNS[one.state] + (f" {one.reached}/{one.settings}" if some else "")
+def _sign(outcome: Outcome) -> str:
+    some = 0 < outcome.reached < outcome.settings
+    return SIGNS[outcome.state] + (f" {outcome.reached}/{outcome.settings}" if some else "")
 
 
 def _outcome(records: Sequence[Record]) -> Outcome:
@@ -79,8 +79,8 @@ def _outcome(records: Sequence[Record]) -> Outcome:
             said.setdefault(reason_of(record), []).append(record.case.method)
     same = len({reason_of(record) for record in records}) == 1
     reasons = [reason if same else f"{', '.join(who)}: {reason}" for reason, who in said.items()]
-    found: list[State] = [state for state in SIGNS if state in states]
-    return Outcome(found[0] if found else "absent", sum(map(reached, records)), len(states), reasons)
+    present: list[State] = [state for state in SIGNS if state in states]
+    return Outcome(present[0] if present else "absent", sum(map(reached, records)), len(states), reasons)
 
 
 def sentences(records: Sequence[Record]) -> list[str]:
@@ -105,7 +105,7 @@ def doubts(records: Sequence[Record]) -> list[str]:
     """Return sentences on what to distrust: times taken on a busy machine, several machines, limits."""
     said = disturbed(records) + beside(records)
     rounds = _rounds(records)
-    calibrations = sorted(seconds for one in rounds for seconds in one.calibration)
+    calibrations = sorted(seconds for round_ in rounds for seconds in round_.calibration)
     if len(calibrations) >= 4:
         low, high = calibrations[len(calibrations) // 10], calibrations[-1 - len(calibrations) // 10]
         if high > STEADY * low:
@@ -132,7 +132,7 @@ def doubts(records: Sequence[Record]) -> list[str]:
 
 def disturbed(records: Sequence[Record]) -> list[str]:
     """Return a sentence where the machine had other work while times were taken."""
-    share = median(one.share for one in rounds) if (rounds := _rounds(records)) else 1.0
+    share = median(round_.share for round_ in rounds) if (rounds := _rounds(records)) else 1.0
     if share >= UNDISTURBED:
         return []
     return [
@@ -145,7 +145,7 @@ def beside(records: Sequence[Record]) -> list[str]:
     """Return a sentence on what else ran while interleaved times were taken, where that was looked at."""
     if not (loads := _loads(records)):
         return []
-    others, stolen = (_shares([getattr(load, of) for load in loads]) for of in ("others", "stolen"))
+    others, stolen = (_shares([getattr(load, name) for load in loads]) for name in ("others", "stolen"))
     doubt = "; the times are doubtful" if busy(records) else ""
     return [
         f"While times were taken, other processes used {others} of a core, and the host kept {stolen} of "
@@ -162,7 +162,7 @@ def compilations(records: Sequence[Record]) -> list[str]:
     )
     if not ratios:
         return []
-    count = 1 + max(one.compilation for one in _rounds(records))
+    count = 1 + max(round_.compilation for round_ in _rounds(records))
     middle, (most, method) = ratios[len(ratios) // 2][0], ratios[-1]
     return [
         f"Compiled {count} times, in fresh processes with empty caches; those that chose a setting did not "
@@ -173,10 +173,10 @@ def compilations(records: Sequence[Record]) -> list[str]:
 
 def _by_compilation(record: Record) -> list[float]:
     """Return the median times of the compilations of a case."""
-    found: dict[int, list[float]] = {}
-    for one in record.timing.rounds if record.timing else ():
-        found.setdefault(one.compilation, []).extend(one.samples)
-    return [median(samples) for samples in found.values() if samples]
+    samples_of: dict[int, list[float]] = {}
+    for round_ in record.timing.rounds if record.timing else ():
+        samples_of.setdefault(round_.compilation, []).extend(round_.samples)
+    return [median(samples) for samples in samples_of.values() if samples]
 
 
 def busy(records: Sequence[Record]) -> bool:
@@ -194,7 +194,7 @@ def _shares(values: Sequence[float]) -> str:
 
 
 def _rounds(records: Sequence[Record]) -> list[TimingRound]:
-    return [one for record in records if record.timing for one in record.timing.rounds]
+    return [round_ for record in records if record.timing for round_ in record.timing.rounds]
 
 
 def _settings(records: Sequence[Record]) -> tuple[int, int]:

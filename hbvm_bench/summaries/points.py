@@ -7,7 +7,7 @@ from typing import TypeVar
 
 from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.store.records import Record
-from hbvm_bench.summaries.rows import by, reached, tasks
+from hbvm_bench.summaries.rows import grouped_by, reached, tasks
 
 T = TypeVar("T")
 
@@ -27,13 +27,13 @@ def family_of(record: Record) -> str:
 
 def by_problem(records: Sequence[Record]) -> dict[str, list[Record]]:
     """Return the cases that are no ensembles, problem by problem, in order; one with two grids is two."""
-    found = tasks(singles(records))
-    return {task.problem + task.sampled(found): members for task, members in found.items()}
+    tasks_ = tasks(singles(records))
+    return {task.problem + task.sampled(tasks_): members for task, members in tasks_.items()}
 
 
 def by_family(records: Sequence[Record]) -> dict[str, list[Record]]:
     """Return cases family by family, in order."""
-    return by(family_of, records)
+    return grouped_by(family_of, records)
 
 
 def singles(records: Sequence[Record]) -> list[Record]:

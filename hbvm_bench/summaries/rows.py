@@ -76,18 +76,18 @@ def rows(records: Sequence[Record], sort: str | None = None) -> list[Row]:
     energy alone ranks nobody.
     """
     key = find(sort).key if sort else RANKED_BY
-    made = [_row(record) for record in records]
+    result = [_row(record) for record in records]
     order = list(GROUPS)
     # sorting is stable: what has no number keeps the campaign's order
-    return sorted(made, key=lambda row: (order.index(row.group), _sort_value(row, key)))
+    return sorted(result, key=lambda row: (order.index(row.group), _sort_value(row, key)))
 
 
-def by(key: Callable[[R], K], records: Iterable[R]) -> dict[K, list[R]]:
+def grouped_by(key: Callable[[R], K], records: Iterable[R]) -> dict[K, list[R]]:
     """Return the records that have one key together, in order."""
-    made: dict[K, list[R]] = {}
+    groups: dict[K, list[R]] = {}
     for record in records:
-        made.setdefault(key(record), []).append(record)
-    return made
+        groups.setdefault(key(record), []).append(record)
+    return groups
 
 
 class Task(NamedTuple):
@@ -98,7 +98,7 @@ class Task(NamedTuple):
     grid: str  # as JSON
 
     @classmethod
-    def of(cls, case: Case) -> "Task":
+    def from_case(cls, case: Case) -> "Task":
         """Return that of a case."""
         return cls.on(case.problem, case.grid, case.ensemble)
 
@@ -109,7 +109,7 @@ class Task(NamedTuple):
 
     def sampled(self, tasks: Iterable["Task"]) -> str:
         """Return what tells it from others of ``tasks`` that differ in their samples alone; else ``""``."""
-        if not any(one != self and one[:2] == self[:2] for one in tasks):
+        if not any(task != self and task[:2] == self[:2] for task in tasks):
             return ""
         said = [f"{name}={value!r}" for name, value in msgspec.json.decode(self.grid).items()]
         return f", sampled with {', '.join(said) or 'the usual grid'}"
@@ -117,7 +117,7 @@ class Task(NamedTuple):
 
 def tasks(records: Sequence[Record]) -> dict[Task, list[Record]]:
     """Return the records of each table, in order: errors at different times are not compared."""
-    return by(lambda record: Task.of(record.case), records)
+    return grouped_by(lambda record: Task.from_case(record.case), records)
 
 
 def at_once(ensemble: Ensemble | None) -> str:
@@ -128,14 +128,14 @@ def at_once(ensemble: Ensemble | None) -> str:
     return f", {ensemble.count} trajectories at once{varied}"
 
 
-def grouped(found: Sequence[Row]) -> list[tuple[str, list[Row]]]:
+def grouped(rows_: Sequence[Row]) -> list[tuple[str, list[Row]]]:
     """Return the groups that have rows, each with its title, which says what ranks them."""
-    made = []
+    groups = []
     for group, title in GROUPS.items():
-        members = [row for row in found if row.group == group]
+        members = [row for row in rows_ if row.group == group]
         ranked = group in ("on", "apart")
-        made += [(title + ", by position error at the end" * ranked, members)] if members else []
-    return made
+        groups += [(title + ", by position error at the end" * ranked, members)] if members else []
+    return groups
 
 
 def numbers(records: Sequence[Record]) -> dict[str, int]:

@@ -32,17 +32,17 @@ class Comparison:
 
 def entries(campaign: Campaign, records: Sequence[Record]) -> list[tuple[ProblemEntry, list[Record]]]:
     """Return the problems of a campaign, then its ensembles, each with the records of its cases."""
-    found: list[tuple[ProblemEntry, list[Record]]] = []
+    result: list[tuple[ProblemEntry, list[Record]]] = []
     tables = tasks(records)
     for entry in campaign.entries():
         for chosen in combinations(entry.sweep):
             problem = make_problem(fill(entry.use, entry.values | chosen))
             grid = campaign.grid if entry.grid is None else entry.grid
-            found.append((entry, tables.get(Task.on(repr(problem), grid), [])))
+            result.append((entry, tables.get(Task.on(repr(problem), grid), [])))
     for many in campaign.ensembles:
         task = Task.on(repr(make_problem(many.problem)), ensemble=many.ensemble)
-        found.append((many.entry, tables.get(task, [])))
-    return found
+        result.append((many.entry, tables.get(task, [])))
+    return result
 
 
 def title_of(entry: ProblemEntry) -> str:
@@ -53,8 +53,8 @@ def title_of(entry: ProblemEntry) -> str:
 def among(records: Sequence[Record], who: str) -> list[Record]:
     """Return the records of a family or of one setting; of HBVM and Gauss for ``""``."""
     if not who:
-        return [one for one in records if one.role == "ours"]
-    return [one for one in records if who in (family_of(one), one.case.method)]
+        return [record for record in records if record.role == "ours"]
+    return [record for record in records if who in (family_of(record), record.case.method)]
 
 
 def best(records: Sequence[Record], within: Mapping[str, float], metric: str = TIME) -> Record | None:
@@ -62,7 +62,9 @@ def best(records: Sequence[Record], within: Mapping[str, float], metric: str = T
 
     Times are those of the rounds that choose.
     """
-    able = [one for one in records if accurate(one, within) and number(one, metric) is not None]
+    able = [
+        setting for setting in records if accurate(setting, within) and number(setting, metric) is not None
+    ]
 
     def least(record: Record) -> float:
         rounds = by_round(record) if metric == TIME else {}
@@ -80,22 +82,23 @@ def compare(
         return Comparison(ours, theirs)
     if metric == TIME:
         base = by_round(ours)
-        found = {key: seconds / base[key] for key, seconds in by_round(theirs).items() if key in base}
-        by_others = all(any(map(chooses, by_round(one))) for one in (ours, theirs))
-        apart = [ratio for key, ratio in found.items() if by_others and not chooses(key)]
-        ratios = (apart if chosen else []) or [*found.values()]
-        ratio = Spread.of(ratios) if ratios else None
+        ratio_of = {key: seconds / base[key] for key, seconds in by_round(theirs).items() if key in base}
+        by_others = all(any(map(chooses, by_round(record))) for record in (ours, theirs))
+        apart = [ratio for key, ratio in ratio_of.items() if by_others and not chooses(key)]
+        ratios = (apart if chosen else []) or [*ratio_of.values()]
+        ratio = Spread.from_samples(ratios) if ratios else None
         return Comparison(ours, theirs, ratio, chosen and bool(ratios) and not apart)
     numbers = number(theirs, metric), number(ours, metric)
     ratio = numbers[0] / numbers[1] if numbers[0] is not None and numbers[1] else None
-    return Comparison(ours, theirs, None if ratio is None else Spread.of([ratio]))
+    return Comparison(ours, theirs, None if ratio is None else Spread.from_samples([ratio]))
 
 
 def by_round(record: Record) -> dict[int, float]:
     """Return the seconds of a case by the round of the timing pass, from 0, in which they were taken."""
     rounds = record.timing.rounds if record.timing else []
     return {
-        place if one.number is None else one.number: median(one.samples) for place, one in enumerate(rounds)
+        place if round_.number is None else round_.number: median(round_.samples)
+        for place, round_ in enumerate(rounds)
     }
 
 
@@ -104,8 +107,8 @@ def untuned(records: Sequence[Record], family: str, errors: Sequence[str]) -> Co
 
     Its defaults are what is called so, or has no arguments.
     """
-    named = [(one, parse_spec(one.case.method).arguments) for one in among(records, family)]
-    defaults = [one for one, given in named if one.case.settings == "default" or not given]
+    named = [(record, parse_spec(record.case.method).arguments) for record in among(records, family)]
+    defaults = [record for record, given in named if record.case.settings == "default" or not given]
     theirs = best(defaults, dict.fromkeys(errors, math.inf))
     if theirs is None:
         return Comparison(None, None)
@@ -116,5 +119,5 @@ def untuned(records: Sequence[Record], family: str, errors: Sequence[str]) -> Co
 
 def no_worse(theirs: Record, factors: Mapping[str, float]) -> dict[str, float]:
     """Return the errors that HBVM and Gauss may have at most where they are to be so many times a peer's."""
-    found = {key: (factor, number(theirs, key)) for key, factor in factors.items()}
-    return {key: -1.0 if error is None else factor * error for key, (factor, error) in found.items()}
+    bounds = {key: (factor, number(theirs, key)) for key, factor in factors.items()}
+    return {key: -1.0 if error is None else factor * error for key, (factor, error) in bounds.items()}

@@ -144,8 +144,8 @@ def _rounded(match: re.Match[str]) -> str:
 def with_small_images(svg: str) -> str:
     """Return a drawing whose embedded images have palettes: a third of the characters."""
 
-    def smaller(found: re.Match[str]) -> str:
-        before = base64.b64decode(found[0])
+    def smaller(match: re.Match[str]) -> str:
+        before = base64.b64decode(match[0])
         return base64.b64encode(min(before, small(before), key=len)).decode("ascii")
 
     return re.sub(r"(?<=data:image/png;base64,)[^\"]+", smaller, svg)
@@ -156,9 +156,9 @@ def small(png: bytes) -> bytes:
     from PIL import Image  # comes with matplotlib
 
     method = Image.Quantize.FASTOCTREE  # which knows transparency
-    image, made = Image.open(io.BytesIO(png)).convert("RGBA"), io.BytesIO()
-    image.quantize(COLOURS, method=method, dither=Image.Dither.NONE).save(made, "PNG", optimize=True)
-    return made.getvalue()
+    image, buffer = Image.open(io.BytesIO(png)).convert("RGBA"), io.BytesIO()
+    image.quantize(COLOURS, method=method, dither=Image.Dither.NONE).save(buffer, "PNG", optimize=True)
+    return buffer.getvalue()
 
 
 def inline_svg(picture: Picture, colours: Mapping[str, str]) -> str:
@@ -215,11 +215,11 @@ def log_axis(
 def power_range(values: Iterable[NDArray[np.float64]], low: int, high: int) -> tuple[int, int]:
     """Return the powers of ten between which positive values lie, within ``low`` and ``high``."""
     logs = [np.log10(v[(v > 0) & np.isfinite(v)]) for v in values]
-    logs = [one for one in logs if one.size]
+    logs = [log for log in logs if log.size]
     if not logs:
         return low, high
-    bottom = max(low, math.floor(min(float(one.min()) for one in logs)))
-    top = min(high, math.ceil(max(float(one.max()) for one in logs)))
+    bottom = max(low, math.floor(min(float(log.min()) for log in logs)))
+    top = min(high, math.ceil(max(float(log.max()) for log in logs)))
     return min(bottom, high - 1), max(top, min(bottom, high - 1) + 1)
 
 

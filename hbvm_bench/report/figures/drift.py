@@ -26,13 +26,13 @@ Found = tuple[Array, Array, Law]
 
 def drift_figure(cases: Sequence[Drawn]) -> Picture | None:
     """Draw the error of the energy, rms over starts and windows of time, with its law; else ``None``."""
-    found = {c.record.id: got for c in cases[:MOST_CASES] if (got := _drift(c)) is not None}
-    shown = [case for case in cases if case.record.id in found and _visible(found[case.record.id][1])]
+    drifts = {c.record.id: got for c in cases[:MOST_CASES] if (got := _drift(c)) is not None}
+    shown = [case for case in cases if case.record.id in drifts and _visible(drifts[case.record.id][1])]
     if not shown:
         return None
-    laws = {key: law for key, (_, _, law) in found.items()}
+    laws = {key: law for key, (_, _, law) in drifts.items()}
     said = {key: text(law) for key, law in laws.items()}
-    curves = {key: _windows(t, rows) for key, (t, rows, _) in found.items()}
+    curves = {key: _windows(t, rows) for key, (t, rows, _) in drifts.items()}
     label = "energy error, rms"
     notes = {key: words.replace(" to ", "–") for key, words in said.items()}
     figure, grid = family_panels(shown, label, notes)

@@ -58,7 +58,7 @@ def still(cases: Sequence[Drawn], title: str) -> Picture | None:
     every = max(1, len(panes[0][0].series["t"]) // NUMBERS)
     traces = [trace(c, c.series["t"][::every], c.series["y"][::every, PLANETOID_Z]) for c in shown]
     said = "; ".join(f"{c.record.case.method}: {_fate(c, float(c.series['t'][-1]))}" for c in shown)
-    made = picture(
+    still_picture = picture(
         figure,
         "motion",
         title,
@@ -69,7 +69,7 @@ def still(cases: Sequence[Drawn], title: str) -> Picture | None:
         Plot([Panel("", Axis("time"), Axis("z of the planetoid"), traces)]),
     )
     view = {"grain": GRAIN, "revolution": REVOLUTION, "camera": [YAW, PITCH], "reach": REACH}
-    return replace(made, motion=view | {"panes": [[_case(case) for case in pane] for pane in panes]})
+    return replace(still_picture, motion=view | {"panes": [[_case(case) for case in pane] for pane in panes]})
 
 
 def _case(case: Drawn) -> dict[str, Any]:

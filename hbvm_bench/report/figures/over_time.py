@@ -77,33 +77,33 @@ class OverTime:
         return (series[self.t], series[names[0]]) if names and series[self.t].size else None
 
 
-def over_time(cases: Sequence[Drawn], what: OverTime) -> Picture | None:
+def over_time(cases: Sequence[Drawn], spec: OverTime) -> Picture | None:
     """Draw an error over time, a panel per family; ``None`` if no case has it."""
-    shown = [case for case in cases if what.get(case.series) is not None]
+    shown = [case for case in cases if spec.get(case.series) is not None]
     if not shown:
         return None
-    figure, grid = family_panels(shown, what.label)
+    figure, grid = family_panels(shown, spec.label)
     for axes, members in grid:
-        log_axis(axes, "y", what.low, what.high, zero=10.0**what.low if what.zero else None)
+        log_axis(axes, "y", spec.low, spec.high, zero=10.0**spec.low if spec.zero else None)
         axes.grid(visible=False, axis="x")
         ends = [case.series["t"][[0, -1]] for case in shown]
         axes.set_xlim(min(end[0] for end in ends), max(end[1] for end in ends))
         for case in members:
-            _draw_error(axes, case, what)
-        panel_legend(axes, members, markers=not what.joined)
+            _draw_error(axes, case, spec)
+        panel_legend(axes, members, markers=not spec.joined)
     curves, largest = [], []
     for case in shown:
-        t, values = _finite(case, what)
+        t, values = _finite(case, spec)
         largest.append(
             f"{case.record.case.method}: {f'{values.max():.1e}' if values.size else 'none finite'}"
         )
-        if what.joined:
+        if spec.joined:
             t, values = envelope(t, values, FINE_BINS)
-        curves.append(trace(case, t, np.where(values > 0.0, values, 0.0 if what.zero else np.nan)))
-    summary = f"{what.title}, largest values. {'; '.join(largest)}."
-    y = Axis(what.label, log=True)
+        curves.append(trace(case, t, np.where(values > 0.0, values, 0.0 if spec.zero else np.nan)))
+    summary = f"{spec.title}, largest values. {'; '.join(largest)}."
+    y = Axis(spec.label, log=True)
     plot = Plot([Panel("", Axis("time"), y, curves)])
-    return picture(figure, what.key, what.title, what.caption, summary, plot)
+    return picture(figure, spec.key, spec.title, spec.caption, summary, plot)
 
 
 def trace(case: Drawn, x: Array, y: Array, **more: Any) -> Trace:
@@ -111,8 +111,8 @@ def trace(case: Drawn, x: Array, y: Array, **more: Any) -> Trace:
     return Trace(case.look.number, case.record.case.method, x, y, **more)
 
 
-def _finite(case: Drawn, what: OverTime) -> tuple[Array, Array]:
-    got = what.get(case.series)
+def _finite(case: Drawn, spec: OverTime) -> tuple[Array, Array]:
+    got = spec.get(case.series)
     assert got is not None
     t, values = got
     finite = np.isfinite(values)
@@ -132,7 +132,7 @@ def family_panels(
     ]
     figure = new(WIDTH, sum(heights))
     panel = (WIDTH - LEFT - RIGHT - GAP * (COLUMNS - 1)) / COLUMNS
-    made: list[tuple[Axes, list[Drawn]]] = []
+    panels_: list[tuple[Axes, list[Drawn]]] = []
     ceiling = sum(heights)
     for row, used in zip(rows, heights, strict=True):
         for column, (name, members) in enumerate(row):
@@ -146,9 +146,9 @@ def family_panels(
                 axes.yaxis.set_label_coords(-0.72 / panel, 0.5)
             else:
                 axes.tick_params(labelleft=False)
-            made.append((axes, members))
+            panels_.append((axes, members))
         ceiling -= used
-    return figure, made
+    return figure, panels_
 
 
 def panel_legend(
@@ -205,18 +205,18 @@ def envelope(t: Array, values: Array, bins: int = BINS) -> tuple[Array, Array]:
     return t[chosen], values[chosen]
 
 
-def _draw_error(axes: Axes, case: Drawn, what: OverTime) -> None:
-    t, values = _finite(case, what)
+def _draw_error(axes: Axes, case: Drawn, spec: OverTime) -> None:
+    t, values = _finite(case, spec)
     if t.size == 0:
         return
-    if what.joined:
+    if spec.joined:
         t, values = envelope(t, values)
-    elif not what.zero:  # the start is right by definition
-        seen = values >= 10.0**what.low
+    elif not spec.zero:  # the start is right by definition
+        seen = values >= 10.0**spec.low
         t, values = t[seen], values[seen]
-    bottom = 10.0**what.low
-    clipped = np.clip(values, bottom * (10.0 if what.zero else 1.0), 10.0**what.high)
-    drawn = np.where(values == 0, bottom, clipped) if what.zero else clipped
+    bottom = 10.0**spec.low
+    clipped = np.clip(values, bottom * (10.0 if spec.zero else 1.0), 10.0**spec.high)
+    drawn = np.where(values == 0, bottom, clipped) if spec.zero else clipped
     (line,) = axes.plot(t, drawn, color=case.look.light, dashes=case.look.dash, clip_on=False)
-    if not what.joined:
+    if not spec.joined:
         line.set(linewidth=0.7, marker=case.look.marker, markersize=2.6, markevery=max(1, t.size // 10))

@@ -67,17 +67,17 @@ def numbers(plot: Plot) -> Table:
         places = _places(ends, log=bool(plot.panels) and plot.panels[0].x.log)
         laws = {(panel.title, trace.case): trace.note for panel, trace in traces if trace.role == "law"}
         head = (*head, *(f"at {place:.3g}" for place in places), "largest", "law")
-        found = [
+        cells = [
             [(*(_at(trace, place) for place in places), _range(np.abs(trace.y))[1], laws.get(key, ""))]
             for key, trace in (((panel.title, trace.case), trace) for panel, trace in cases)
         ]
     elif plot.kind == "points":
         head = (*head, "x", "y")
-        found = [[(_text(x), _text(y)) for x, y in zip(t.x, t.y, strict=True)] for _, t in cases]
+        cells = [[(_text(x), _text(y)) for x, y in zip(t.x, t.y, strict=True)] for _, t in cases]
     else:
         head = (*head, "points", "x from", "to", "y from", "to")
-        found = [[(str(trace.x.size), *_range(trace.x), *_range(trace.y))] for _, trace in cases]
-    rows = [(*first, *one) for first, each in zip(firsts, found, strict=True) for one in each]
+        cells = [[(str(trace.x.size), *_range(trace.x), *_range(trace.y))] for _, trace in cases]
+    rows = [(*first, *row_) for first, each in zip(firsts, cells, strict=True) for row_ in each]
     return Table("", head, rows, words=range(3))
 
 

@@ -22,29 +22,29 @@ NEVER = 6.0  # decades: the end of the axis where a family is not within any fac
 def profiles(records: Sequence[Record], numbers: Mapping[str, int]) -> Picture | None:
     """Draw the profiles, ``None`` for too few problems; ``numbers`` are the looks of the families."""
     work = work_of(records)
-    found = [profile(records, accuracy, work) for accuracy in ACCURACIES]
-    found = [one for one in found if one.problems >= FEWEST_PROBLEMS]
-    if not found:
+    shown = [profile(records, accuracy, work) for accuracy in ACCURACIES]
+    shown = [item for item in shown if item.problems >= FEWEST_PROBLEMS]
+    if not shown:
         return None
     label = find(work).label
     figure = new(WIDTH, 4.2)
     figure.subplots_adjust(left=0.06, right=0.86, top=0.92, bottom=0.12, wspace=0.14)
-    grid = figure.subplots(1, len(found), squeeze=False, sharey=True)[0]
+    grid = figure.subplots(1, len(shown), squeeze=False, sharey=True)[0]
     panels: list[Panel] = []
     handles = {}
-    for axes, one in zip(grid, found, strict=True):
+    for axes, item in zip(grid, shown, strict=True):
         traces = []
-        worst = max((r for ratios in one.ratios.values() for r in ratios if np.isfinite(r)), default=10.0)
+        worst = max((r for ratios in item.ratios.values() for r in ratios if np.isfinite(r)), default=10.0)
         end = 10.0 ** min(NEVER, max(1.0, np.ceil(np.log10(worst))))
-        for index, family in enumerate(one.ratios):
-            taus, shares = one.curve(family)
-            if not one.solved(family):
+        for index, family in enumerate(item.ratios):
+            taus, shares = item.curve(family)
+            if not item.solved(family):
                 continue
             x = np.repeat([*taus, end], 2)[1:]
             y = np.repeat(shares, 2)
             x, y = x[: y.size], y[: x.size]
             colour, _, marker = base(family)
-            same = [name for name in list(one.ratios)[:index] if base(name)[0] == colour]
+            same = [name for name in list(item.ratios)[:index] if base(name)[0] == colour]
             every = (index % 3, max(3, x.size // 6))
             (line,) = axes.plot(x, y, color=colour, marker=marker, markevery=every, markersize=4)
             line.set(linewidth=1.6, dashes=DASHES[len(same)], clip_on=False)
@@ -53,19 +53,19 @@ def profiles(records: Sequence[Record], numbers: Mapping[str, int]) -> Picture |
         log_axis(axes, "x", 0, round(np.log10(end)))
         axes.set_ylim(-0.02, 1.02)
         axes.yaxis.set_major_formatter(PercentFormatter(1.0))
-        axes.set_title(one.words, color=INK, fontsize=8)
+        axes.set_title(item.words, color=INK, fontsize=8)
         behind, share = Axis(f"{label}, relative to the best family", log=True), Axis("share of problems")
         axes.set_xlabel(behind.label)
-        panels.append(Panel(one.words, behind, share, traces))
+        panels.append(Panel(item.words, behind, share, traces))
     figure.legend(handles.values(), handles.keys(), loc="center left", bbox_to_anchor=(0.87, 0.5))
     said = " ".join(
-        f"{one.words}, {one.problems} problems: "
+        f"{item.words}, {item.problems} problems: "
         + ", ".join(
-            f"{name} best on {one.wins(name)}, solves {one.solved(name)} of {one.ran(name)}"
-            for name in one.ratios
+            f"{name} best on {item.wins(name)}, solves {item.solved(name)} of {item.ran(name)}"
+            for name in item.ratios
         )
         + "."
-        for one in found
+        for item in shown
     )
     return picture(
         figure,

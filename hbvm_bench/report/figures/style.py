@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries.points import by_family
-from hbvm_bench.summaries.rows import by
+from hbvm_bench.summaries.rows import grouped_by
 
 # Of each method: its colour in the light and in the dark theme, and its marker.
 METHODS = {
@@ -84,14 +84,14 @@ def looks(methods: Iterable[str]) -> dict[str, Look]:
     """Return the look of every method by its text or name, counted from 1; the same on every problem."""
     seen: dict[str, int] = {}
     taken: set[str] = set()
-    made: dict[str, Look] = {}
+    by_method: dict[str, Look] = {}
     for number, method in enumerate(dict.fromkeys(methods), 1):
         light, dark, marker = base(parse_spec(method).name)
         # settings of one colour are told apart by shade and dash, whatever their method's name
         index = seen[light] = seen.get(light, -1) + 1
         light, dark = _unique(_shade(light, index, towards=0.0), taken), _shade(dark, index, towards=1.0)
-        made[method] = Look(number, light, dark, DASHES[index % len(DASHES)], marker)
-    return made
+        by_method[method] = Look(number, light, dark, DASHES[index % len(DASHES)], marker)
+    return by_method
 
 
 def base(name: str) -> tuple[str, str, str]:
@@ -112,15 +112,15 @@ def options(record: Record) -> str:
 
 def panels(records: Sequence[Record]) -> list[tuple[str, list[Record]]]:
     """Divide cases into panels: by library, and by method where a library has more than `IN_A_PANEL`."""
-    made: list[tuple[str, list[Record]]] = []
-    libraries = by(lambda record: "hbvm-bench" if record.role == "ours" else record.library, records)
+    groups: list[tuple[str, list[Record]]] = []
+    libraries = grouped_by(lambda record: "hbvm-bench" if record.role == "ours" else record.library, records)
     for library, members in libraries.items():
         names = by_family(members)
         if len(members) <= IN_A_PANEL:
-            made.append((f"{', '.join(names)} · {library}" if len(names) < 3 else library, members))
+            groups.append((f"{', '.join(names)} · {library}" if len(names) < 3 else library, members))
         else:
-            made += [(f"{name} · {library}", group) for name, group in names.items()]
-    return made
+            groups += [(f"{name} · {library}", group) for name, group in names.items()]
+    return groups
 
 
 def _shade(colour: str, index: int, *, towards: float) -> str:
@@ -142,6 +142,6 @@ def _unique(colour: str, taken: set[str]) -> str:
     value = int(colour[1:], 16)
     while f"#{value:06x}" in taken or f"#{value:06x}" in NEUTRALS:
         value = (value + 1) % 2**24
-    made = f"#{value:06x}"
-    taken.add(made)
-    return made
+    unique = f"#{value:06x}"
+    taken.add(unique)
+    return unique

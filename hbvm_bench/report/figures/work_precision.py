@@ -80,7 +80,7 @@ def work_precision(cases: Sequence[Drawn]) -> Picture | None:
 
 def _envelopes(axes: Axes, cases: Sequence[Drawn], spots: Sequence[tuple[float, float]]) -> list[Trace]:
     """Join the settings of each method that none of its others beats in both work and error."""
-    made = []
+    traces = []
     for name in dict.fromkeys(family_of(case.record) for case in cases):
         members = [(s, c) for s, c in zip(spots, cases, strict=True) if family_of(c.record) == name]
         best = front([spot for spot, _ in members], lambda spot: spot)
@@ -89,8 +89,8 @@ def _envelopes(axes: Axes, cases: Sequence[Drawn], spots: Sequence[tuple[float, 
         x, y = np.array(best).T
         look = members[0][1].look
         axes.plot(x, y, color=look.light, linewidth=0.8, zorder=1)
-        made.append(Trace(look.number, f"best of {name}", x, y, "law", "on the Pareto front"))
-    return made
+        traces.append(Trace(look.number, f"best of {name}", x, y, "law", "on the Pareto front"))
+    return traces
 
 
 def _number_points(axes: Axes, points: Sequence[tuple[str, tuple[float, float]]]) -> None:

@@ -70,11 +70,11 @@ def measured(name: str, share: float = 1.0, samples: int = SAMPLES) -> Measured:
     """
     problem = SYSTEMS[name].problem(share)
     theirs = Variational(problem)
-    found: dict[str, Any] = {}
+    results: dict[str, Any] = {}
 
     def sample(side: str, run: Callable[[], Any]) -> float:
         start = time.perf_counter()
-        found[side] = run()
+        results[side] = run()
         return time.perf_counter() - start
 
     ours = partial(lyapunov, problem, METHOD, skip=SKIP)
@@ -83,7 +83,7 @@ def measured(name: str, share: float = 1.0, samples: int = SAMPLES) -> Measured:
         before = busy()
         seconds = interleaved([partial(sample, "ours", ours), partial(sample, "heyoka", theirs.run)], samples)
         load = load_between(before, busy())
-    mine: Exponents = found["ours"]
+    mine: Exponents = results["ours"]
     if mine.status is not Status.FINISHED:
         raise InputError(f"{METHOD!r} on {name} ended early: {mine.reason}")
     return Measured(
@@ -91,7 +91,7 @@ def measured(name: str, share: float = 1.0, samples: int = SAMPLES) -> Measured:
         intervals=mine.intervals,
         sum=mine.sum,
         time=mine.time,
-        heyoka=found["heyoka"],
+        heyoka=results["heyoka"],
         seconds=seconds[0],
         heyoka_seconds=seconds[1],
         others=load.others if load else 0.0,

@@ -58,29 +58,29 @@ def _label(name: str, source: str) -> str:
 
 
 @drawn("chaos-megno", "MEGNO over time", WIDTH * 0.8, 3.6)
-def curves(figure: Figure, found: Curves) -> Said:
+def curves(figure: Figure, lines: Curves) -> Said:
     """Draw MEGNO of a regular, a chaotic and a linear motion."""
     axes = figure.subplots()
     looks = (
-        (found.chaotic, "motion", "chaotic", "-"),
-        (found.regular, "hbvm", "quasi-periodic", "-"),
-        (found.linear, "gauss", "linear, absolute", (0, (5, 2))),
+        (lines.chaotic, "motion", "chaotic", "-"),
+        (lines.regular, "hbvm", "quasi-periodic", "-"),
+        (lines.linear, "gauss", "linear, absolute", (0, (5, 2))),
     )
     for (t, y), family, label, dash in looks:
         axes.plot(t, np.abs(y), color=COLOURS[family], linestyle=dash, linewidth=1.4, label=label)
-    t = found.chaotic[0]
-    axes.plot(t, found.exponent * t / 2, color=TRUTH, linewidth=1.0, linestyle=(0, (2, 2)), label="λt/2")
+    t = lines.chaotic[0]
+    axes.plot(t, lines.exponent * t / 2, color=TRUTH, linewidth=1.0, linestyle=(0, (2, 2)), label="λt/2")
     axes.axhline(2.0, color=MUTED, linewidth=0.9, linestyle=(0, (4, 3)))
     say(axes, "2", (1.0, 2.0), (2, 3), color=MUTED)
     log_axis(axes, "x", 0, int(np.ceil(np.log10(t[-1]))))
-    log_axis(axes, "y", -3, int(np.ceil(np.log10(found.chaotic[1].max()))))
+    log_axis(axes, "y", -3, int(np.ceil(np.log10(lines.chaotic[1].max()))))
     axes.set(xlabel="time", ylabel="MEGNO")
     axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
     return (
         "Two orbits of the Hénon–Heiles problem and two uncoupled linear oscillators. Quasi-periodic motion "
         "of a nonlinear system tends to 2, a chaotic one grows like λt/2, a linear one falls to 0.",
-        f"At the end: quasi-periodic {found.regular[1, -1]:.3f}, chaotic {found.chaotic[1, -1]:.0f}, linear "
-        f"{found.linear[1, -1]:.3f}.",
+        f"At the end: quasi-periodic {lines.regular[1, -1]:.3f}, chaotic {lines.chaotic[1, -1]:.0f}, linear "
+        f"{lines.linear[1, -1]:.3f}.",
     )
 
 
@@ -89,9 +89,9 @@ def sitnikov(
     figure: Figure, es: Sequence[float], speeds: Sequence[float], rows: Sequence[Array], turns: int
 ) -> Said:
     """Draw MEGNO of planetoids that stay."""
-    found = np.stack(rows)
+    values_ = np.stack(rows)
     axes = figure.subplots()
-    _bar(figure, axes, _megno(axes, es, speeds, found.T))
+    _bar(figure, axes, _megno(axes, es, speeds, values_.T))
     axes.axvline(CRITICAL, color=INK, linewidth=1.2, linestyle=(0, (4, 3)))
     say(axes, f"the paper's critical e = {CRITICAL:g}", (CRITICAL, speeds[-1]), (-5, -10), ha="right")
     axes.plot(0.75, START[1], "o", mfc="none", mec=PALE, markersize=7)
@@ -103,7 +103,7 @@ def sitnikov(
         "and it moves on the axis. Blank: it goes farther than 100. The original paper names a critical "
         "eccentricity, from which on motion is chaotic. For motion on the axis the map shows no change "
         "there, and the paper's run is among the regular ones.",
-        _share(found),
+        _share(values_),
     )
 
 
@@ -119,11 +119,11 @@ def sections(
     panels = figure.subplots(1, len(energies), sharey=True)
     meshes, said = [], []
     for axes, energy, rows in zip(panels, maps.ENERGIES, energies, strict=True):
-        found = np.stack(rows)
-        meshes.append(_megno(axes, positions, momenta, found))
+        values_ = np.stack(rows)
+        meshes.append(_megno(axes, positions, momenta, values_))
         axes.set(xlabel="q₂", aspect="equal")
         axes.set_title(f"H = 1/{round(1 / energy)}")
-        said.append(f"H = 1/{round(1 / energy)}: {_share(found)}")
+        said.append(f"H = 1/{round(1 / energy)}: {_share(values_)}")
     panels[0].set_ylabel("p₂")
     _bar(figure, list(panels), meshes[-1])
     return (
@@ -145,9 +145,9 @@ def asteroids(
     figure: Figure, axes_: Sequence[float], eccentricities: Sequence[float], rows: Sequence[Array], turns: int
 ) -> Said:
     """Draw MEGNO over semi-major axis and eccentricity."""
-    found = np.stack(rows)
+    values_ = np.stack(rows)
     axes = figure.subplots()
-    _bar(figure, axes, _megno(axes, axes_, eccentricities, found))
+    _bar(figure, axes, _megno(axes, axes_, eccentricities, values_))
     top = eccentricities[-1]
     for inner, outer in ((3, 1), (5, 2), (2, 1), (5, 3), (3, 2), (4, 3)):
         at = (outer / inner) ** (2 / 3)
@@ -161,12 +161,12 @@ def asteroids(
         "the pericentre on the far side of the Sun from Jupiter, which moves on a circle. Marks: where the "
         "periods are in the ratios written. Chaos spreads from Jupiter's orbit inwards as eccentricities "
         "grow, with regular islands at resonances. Blank: the integration did not reach its end.",
-        _share(found),
+        _share(values_),
     )
 
 
-def _megno(axes: Axes, x: Sequence[float], y: Sequence[float], found: Array) -> QuadMesh:
-    return heat(axes, x, y, np.maximum(found, 10.0**LOW), LOW, HIGH)
+def _megno(axes: Axes, x: Sequence[float], y: Sequence[float], values_: Array) -> QuadMesh:
+    return heat(axes, x, y, np.maximum(values_, 10.0**LOW), LOW, HIGH)
 
 
 def _bar(figure: Figure, axes: Axes | list[Axes], mesh: QuadMesh) -> None:
@@ -176,7 +176,7 @@ def _bar(figure: Figure, axes: Axes | list[Axes], mesh: QuadMesh) -> None:
     bar.set_label("MEGNO; 2: regular")
 
 
-def _share(found: Array) -> str:
-    known = found[~np.isnan(found)]
+def _share(values_: Array) -> str:
+    known = values_[~np.isnan(values_)]
     chaotic = np.count_nonzero(known > CHAOTIC) / max(known.size, 1)
     return f"MEGNO is above {CHAOTIC:g} for {chaotic:.0%} of {known.size} orbits."

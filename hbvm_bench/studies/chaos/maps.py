@@ -43,11 +43,11 @@ def _sitnikov(e: float, speeds: Sequence[float], turns: int) -> Array:
     t_end = math.pi + turns * axis_motion.TURN
     system = axis_motion.AXIS
     problem = Problem(system, y0=starts[0], parameters={"e": e}, t0=math.pi, t_end=t_end)
-    found = np.full(len(speeds), np.nan)
+    values = np.full(len(speeds), np.nan)
     if stays.any():
         here = indicator_map(problem, "megno", SITNIKOV, starts=starts[stays], samples=SAMPLES)
-        found[stays] = here.values
-    return found
+        values[stays] = here.values
+    return values
 
 
 def henon_heiles_section(

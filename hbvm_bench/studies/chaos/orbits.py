@@ -107,10 +107,10 @@ def curves(share: float = 1.0) -> Curves:
     )
 
 
-def _curve(found: Indicator) -> Array:
+def _curve(indicator: Indicator) -> Array:
     """Return times and values, evenly spaced in the logarithm of time, with the last."""
-    places = np.geomspace(1, found.t.size, DRAWN).astype(int) - 1
-    return np.stack([found.t, found.values])[:, np.unique(places)]
+    places = np.geomspace(1, indicator.t.size, DRAWN).astype(int) - 1
+    return np.stack([indicator.t, indicator.values])[:, np.unique(places)]
 
 
 @dataclass(frozen=True)
@@ -140,9 +140,12 @@ def planets(name: str, share: float = 1.0, samples: int = SAMPLES) -> Planets:
     t_end = share * REVOLUTIONS * PERIOD
     bodies = _simulation(axis, eccentricity).particles
     problem = nbody(
-        [one.m for one in bodies], [one.xyz for one in bodies], [one.vxyz for one in bodies], t_end=t_end
+        [body.m for body in bodies],
+        [body.xyz for body in bodies],
+        [body.vxyz for body in bodies],
+        t_end=t_end,
     )
-    found: dict[str, Any] = {}
+    results: dict[str, Any] = {}
     runs: dict[str, Callable[[], Any]] = {
         repr(OURS): partial(megno, problem, OURS),
         "REBOUND, IAS15": partial(_rebound, axis, eccentricity, t_end, "ias15"),
@@ -151,7 +154,7 @@ def planets(name: str, share: float = 1.0, samples: int = SAMPLES) -> Planets:
 
     def sample(key: str) -> float:
         start = time.perf_counter()
-        found[key] = runs[key]()
+        results[key] = runs[key]()
         return time.perf_counter() - start
 
     with no_collection():
@@ -161,12 +164,12 @@ def planets(name: str, share: float = 1.0, samples: int = SAMPLES) -> Planets:
         load = load_between(before, busy())
     mine = lyapunov(problem, OURS, count=1)
     rows = []
-    for (key, made), taken in zip(found.items(), seconds, strict=True):
-        if isinstance(made, Indicator):
+    for (key, result), taken in zip(results.items(), seconds, strict=True):
+        if isinstance(result, Indicator):
             low, high = mine.intervals[0].tolist()
-            rows.append(Row(key, made.value, float(mine.exponents[0]), low, high, taken))
+            rows.append(Row(key, result.value, float(mine.exponents[0]), low, high, taken))
         else:
-            indicator, exponent = made
+            indicator, exponent = result
             rows.append(Row(key, indicator, exponent, None, None, taken))
     return Planets(rows, load.others if load else 0.0, load.stolen if load else 0.0)
 
@@ -174,20 +177,20 @@ def planets(name: str, share: float = 1.0, samples: int = SAMPLES) -> Planets:
 def _simulation(axis: float, eccentricity: float) -> Any:
     import rebound
 
-    made = rebound.Simulation()
-    made.add(m=1.0)
-    made.add(**JUPITER)
-    made.add(**SATURN, a=axis, e=eccentricity)
-    made.move_to_com()
-    return made
+    simulation = rebound.Simulation()
+    simulation.add(m=1.0)
+    simulation.add(**JUPITER)
+    simulation.add(**SATURN, a=axis, e=eccentricity)
+    simulation.move_to_com()
+    return simulation
 
 
 def _rebound(axis: float, eccentricity: float, t_end: float, integrator: str) -> tuple[float, float]:
     """Return REBOUND's MEGNO and exponent."""
-    made = _simulation(axis, eccentricity)
-    made.integrator = integrator
+    simulation = _simulation(axis, eccentricity)
+    simulation.integrator = integrator
     if integrator == "whfast":
-        made.dt = WHFAST_STEP
-    made.init_megno(seed=1)
-    made.integrate(t_end)
-    return made.megno(), made.lyapunov()
+        simulation.dt = WHFAST_STEP
+    simulation.init_megno(seed=1)
+    simulation.integrate(t_end)
+    return simulation.megno(), simulation.lyapunov()

@@ -63,7 +63,7 @@ class Grids:
     eccentricities: list[float]
 
     @classmethod
-    def of(cls, size: Size) -> "Grids":
+    def from_size(cls, size: Size) -> "Grids":
         """Return the grids of a size."""
         return cls(
             es=np.linspace(0.0, 0.9, size.sitnikov[0]).round(6).tolist(),
@@ -78,7 +78,7 @@ class Grids:
 def parts(*, quick: bool) -> list[Part]:
     """Return what is computed and shown, in a quick run or a whole one."""
     size = QUICK if quick else FULL
-    grids = Grids.of(size)
+    grids = Grids.from_size(size)
     measured = partial(exponents.measured, share=size.share, samples=size.samples)
     planets = partial(orbits.planets, share=size.share, samples=size.samples)
     timed = [
@@ -118,8 +118,8 @@ def parts(*, quick: bool) -> list[Part]:
             "Sitnikov's problem",
             split("map", sitnikov, grids.es, PIECES, 20.0),
             _none,
-            lambda found: [
-                ("the map", lambda: figures.sitnikov(grids.es, grids.speeds, found["map"], size.turns))
+            lambda results: [
+                ("the map", lambda: figures.sitnikov(grids.es, grids.speeds, results["map"], size.turns))
             ],
         ),
         Part(
@@ -127,13 +127,13 @@ def parts(*, quick: bool) -> list[Part]:
             "The Hénon–Heiles problem",
             sections,
             _none,
-            lambda found: [
+            lambda results: [
                 (
                     "the sections",
                     lambda: figures.sections(
                         grids.positions,
                         grids.momenta,
-                        [found[f"energy{i}"] for i in range(len(maps.ENERGIES))],
+                        [results[f"energy{i}"] for i in range(len(maps.ENERGIES))],
                         size.section_end,
                     ),
                 )
@@ -144,11 +144,11 @@ def parts(*, quick: bool) -> list[Part]:
             "The restricted three-body problem",
             split("map", asteroids, grids.eccentricities, PIECES, 20.0),
             _none,
-            lambda found: [
+            lambda results: [
                 (
                     "the map",
                     lambda: figures.asteroids(
-                        grids.axes, grids.eccentricities, found["map"], size.revolutions
+                        grids.axes, grids.eccentricities, results["map"], size.revolutions
                     ),
                 )
             ],
@@ -185,13 +185,13 @@ def _parts(run: Run) -> list[tuple[Part, Results]]:
     return [(part, Results(part, kept, records)) for part in parts(quick=quick)]
 
 
-def _none(found: Results) -> list[Claim]:
-    del found
+def _none(results: Results) -> list[Claim]:
+    del results
     return []
 
 
-def _measured(found: Results) -> dict[str, exponents.Measured]:
-    return {name: found[f"of {name}"] for name in SYSTEMS}
+def _measured(results: Results) -> dict[str, exponents.Measured]:
+    return {name: results[f"of {name}"] for name in SYSTEMS}
 
 
 def _interval(value: float, low: float, high: float) -> str:
@@ -200,17 +200,17 @@ def _interval(value: float, low: float, high: float) -> str:
     return f"{value:.{digits}f} [{low:.{digits}f}, {high:.{digits}f}]"
 
 
-def _within(known: Published, found: exponents.Measured) -> bool:
-    low, high = found.intervals[0]
+def _within(known: Published, measured: exponents.Measured) -> bool:
+    low, high = measured.intervals[0]
     return bool(low <= known.exponents[0] <= high)
 
 
-def _exponent_claims(found: Results) -> list[Claim]:
-    made = []
-    for name, here in _measured(found).items():
+def _exponent_claims(results: Results) -> list[Claim]:
+    judged = []
+    for name, here in _measured(results).items():
         for published in SYSTEMS[name].published:
             fits = _within(published, here)
-            made.append(
+            judged.append(
                 Claim(
                     f"{SYSTEMS[name].title}: the largest exponent",
                     f"{published.exponents[0]:g} ({published.source})",
@@ -219,7 +219,7 @@ def _exponent_claims(found: Results) -> list[Claim]:
                     "holds" if fits else "no",
                 )
             )
-    return made
+    return judged
 
 
 def _decided(known: Known, published: Published, here: exponents.Measured) -> str:
@@ -246,9 +246,9 @@ def _decided(known: Known, published: Published, here: exponents.Measured) -> st
     )
 
 
-def _exact_claims(found: Results) -> list[Claim]:
-    checks: orbits.Checks = found["checks"]
-    curves: orbits.Curves = found["curves"]
+def _exact_claims(results: Results) -> list[Claim]:
+    checks: orbits.Checks = results["checks"]
+    curves: orbits.Curves = results["curves"]
     off = abs(checks.sum + 41 / 3)
     ratio = 2.0 * curves.chaotic[1, -1] / (curves.exponent * curves.chaotic[0, -1])
     last, flat = float(curves.regular[1, -1]), float(curves.linear[1, -1])
@@ -287,21 +287,21 @@ def _exact_claims(found: Results) -> list[Claim]:
     ]
 
 
-def _exponent_blocks(share: float, found: Results) -> list[Maker]:
+def _exponent_blocks(share: float, results: Results) -> list[Maker]:
     def planets() -> Table:
-        return _planets({name: found[f"planets {name}"] for name in orbits.PLANETS}, share)
+        return _planets({name: results[f"planets {name}"] for name in orbits.PLANETS}, share)
 
     return [
-        ("the values", lambda: figures.values(_measured(found))),
-        ("the times", lambda: _times(_measured(found))),
+        ("the values", lambda: figures.values(_measured(results))),
+        ("the times", lambda: _times(_measured(results))),
         ("the planets", planets),
         ("how", lambda: Note(HOW)),
         ("the sources", lambda: Items([f"{key}: {text}" for key, text in SOURCES.items()])),
     ]
 
 
-def _curve_blocks(found: Results) -> list[Maker]:
-    return [("MEGNO over time", lambda: figures.curves(found["curves"]))]
+def _curve_blocks(results: Results) -> list[Maker]:
+    return [("MEGNO over time", lambda: figures.curves(results["curves"]))]
 
 
 HOW = (
@@ -336,7 +336,7 @@ def _times(measured: dict[str, exponents.Measured]) -> Table:
         rows.append(
             (
                 known.title,
-                ", ".join(f"{one.exponents[0]:g}" for one in known.published),
+                ", ".join(f"{exponents_.exponents[0]:g}" for exponents_ in known.published),
                 _interval(here.exponents[0], *here.intervals[0]),
                 f"{here.heyoka[0]:.4f}",
                 f"{here.time:.0f}",
@@ -360,7 +360,7 @@ def _times(measured: dict[str, exponents.Measured]) -> Table:
     )
 
 
-def _planets(found: dict[str, orbits.Planets], share: float) -> Table:
+def _planets(systems: dict[str, orbits.Planets], share: float) -> Table:
     t_end = share * orbits.REVOLUTIONS * orbits.PERIOD
     rows = [
         (
@@ -373,7 +373,7 @@ def _planets(found: dict[str, orbits.Planets], share: float) -> Table:
             else f"{number(row.exponent)} [{number(row.low)}, {number(row.high)}]",
             _spent(row.seconds, system.others, system.stolen),
         )
-        for name, system in found.items()
+        for name, system in systems.items()
         for row in system.rows
     ]
     return Table(
@@ -385,7 +385,7 @@ def _planets(found: dict[str, orbits.Planets], share: float) -> Table:
         "gravitating bodies only, so it takes no part above; its `lyapunov()` is a slope without an "
         "interval, and its MEGNO excludes safe_mode=0 of WHFast. Where motion is chaotic, 2 MEGNO/t tends to "
         "the exponent. Each library has a tangent vector of its own, and chaotic trajectories of different "
-        "methods diverge." + _busy([max(system.others, system.stolen) for system in found.values()]),
+        "methods diverge." + _busy([max(system.others, system.stolen) for system in systems.values()]),
         words=(0, 1),
         key="exponents-planets",
     )

@@ -72,13 +72,13 @@ def _claims(results: Results) -> list[Claim]:
     gauss: Orbit = results["gauss"][1]
     hbvm: Orbit = results["hbvm"]
     times, steps, escaped = results.each("escapes", METHODS), results.each("steps", METHODS), _maps(results)
-    gone = {family: _times(found) for family, found in times.items()}
+    gone = {family: _times(values) for family, values in times.items()}
     starts = len(times["gauss"])
     middle = float(np.median([np.inf if time is None else time for time in times["gauss"]]))
     inside = _until_gone(gauss)
     slopes = max(float(np.abs([x + 2 * x * y, y + x * x - y * y]).max()) for x, y in SADDLES)
     heights = max(abs(float(experiment.potential(np.array(x), np.array(y))) - ESCAPE) for x, y in SADDLES)
-    left = {family: int(np.count_nonzero(~np.isnan(found))) for family, found in escaped.items()}
+    left = {family: int(np.count_nonzero(~np.isnan(values))) for family, values in escaped.items()}
     largest = {family: kept(rows) for family, rows in steps.items()}
     agrees = max(row.agrees for rows in steps.values() for row in rows if row.h == H)
     return [
@@ -132,9 +132,9 @@ def kept(rows: Sequence[StepRow]) -> float:
     return max((row.h for row in takewhile(lambda row: not _times(row.left), rows)), default=0.0)
 
 
-def _times(found: Sequence[float | None]) -> list[float]:
+def _times(values: Sequence[float | None]) -> list[float]:
     """Return the times at which something happened, without those where it never did."""
-    return sorted(time for time in found if time is not None)
+    return sorted(time for time in values if time is not None)
 
 
 def _until_gone(run: Orbit) -> Array:
@@ -265,12 +265,12 @@ def fates(figure: Figure, times: Mapping[str, Sequence[float | None]]) -> Said:
     """Draw how long neighbouring starts stay: the distribution behind the paper's one number."""
     axes = figure.subplots()
     summary = []
-    for family, found in times.items():
-        gone, method = _times(found), METHODS[family]
-        share = 1 - np.arange(len(gone) + 1) / len(found)
-        look = {"color": COLOURS[family], "linewidth": 1.6, "label": f"{method}, {len(found)} starts"}
+    for family, values in times.items():
+        gone, method = _times(values), METHODS[family]
+        share = 1 - np.arange(len(gone) + 1) / len(values)
+        look = {"color": COLOURS[family], "linewidth": 1.6, "label": f"{method}, {len(values)} starts"}
         axes.step([0, *gone, T_END], [*share, share[-1]], where="post", **look)
-        summary.append(f"{method}: {len(gone)} of {len(found)} orbits leave")
+        summary.append(f"{method}: {len(gone)} of {len(values)} orbits leave")
     axes.axvline(experiment.PRINTED, color=MUTED, linewidth=0.9, linestyle=(0, (4, 3)))
     say(axes, f"the paper's t ≃ {experiment.PRINTED:.0f}", (experiment.PRINTED, 0.04), (5, 0), fontsize=8)
     axes.set(xlim=(0, T_END), ylim=(0, 1.04), xlabel="time", ylabel="share of orbits still inside")
@@ -284,12 +284,12 @@ def fates(figure: Figure, times: Mapping[str, Sequence[float | None]]) -> Said:
 
 
 @drawn("henon-heiles-map", "Beyond the paper · which initial conditions escape", WIDTH, 3.6, values=True)
-def maps(figure: Figure, found: Mapping[str, Array]) -> Said:
+def maps(figure: Figure, times_of: Mapping[str, Array]) -> Said:
     """Escape times over starts and energies, both methods."""
     panels = figure.subplots(1, 2, sharey=True)
     high = math.log10(experiment.MAP_END)
     meshes = []
-    for axes, (family, times) in zip(panels, found.items(), strict=True):
+    for axes, (family, times) in zip(panels, times_of.items(), strict=True):
         meshes.append(heat(axes, np.degrees(experiment.DIRECTIONS), GAPS, np.maximum(times, 1.0), 2, high))
         axes.set(yscale="log", xlabel="direction of the start, degrees", xticks=range(0, 361, 60))
         left = int(np.count_nonzero(~np.isnan(times)))
@@ -306,7 +306,7 @@ def maps(figure: Figure, found: Mapping[str, Array]) -> Said:
     ticks = range(2, math.floor(high) + 1)
     bar.set_ticks(ticks, labels=[power_label(10.0**p) for p in ticks])
     bar.set_label("escape time; blank: inside throughout")
-    gone = {family: ~np.isnan(times) for family, times in found.items()}
+    gone = {family: ~np.isnan(times) for family, times in times_of.items()}
     inside = gone["gauss"][np.asarray(GAPS) >= 4e-3]
     return (
         f"Orbits from (0, 1/2) in every direction, with energies from 1/6 − {number(max(GAPS))} (bottom) to "

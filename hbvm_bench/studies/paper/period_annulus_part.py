@@ -87,9 +87,9 @@ def _blocks(results: Results) -> list[Maker]:
     ]
 
 
-def _by_entry(results: Results, what: str) -> dict[Key, Any]:
+def _by_entry(results: Results, name: str) -> dict[Key, Any]:
     """Return what was computed for each entry of Table 1."""
-    return {(h, s): results[f"{what} {h} {s}"] for h, s in PRINTED}
+    return {(h, s): results[f"{name} {h} {s}"] for h, s in PRINTED}
 
 
 def _claims(results: Results) -> list[Claim]:
@@ -100,10 +100,10 @@ def _claims(results: Results) -> list[Claim]:
     level = float(energy(np.array([P1]))[0])
     far = np.array(results["periods"])
     slope = float(np.polyfit(np.log(far[8:-4, 0]), far[8:-4, 1], 1)[0])
-    long, short = (max(found[key].error for found in cells.values()) for key in ("hbvm", "hbvm_short"))
+    long, short = (max(edges[key].error for edges in cells.values()) for key in ("hbvm", "hbvm_short"))
     near = _nearest(orbits["hbvm"])
     swing = {family: float(np.ptp(energy(y))) for family, (_, y) in orbits.items()}
-    gauss = {key: found["gauss"].error for key, found in cells.items()}
+    gauss = {key: edges["gauss"].error for key, edges in cells.items()}
     single = [gauss[key] / PRINTED[key][1] for key in PRINTED]
     medians = {key: float(np.median(errors)) for key, errors in _by_entry(results, "spread").items()}
     typical = [medians[key] / PRINTED[key][1] for key in PRINTED]
@@ -162,10 +162,10 @@ def _nearest(orbit: Path) -> float:
 def _table(cells: Mapping[Key, Mapping[str, Edge]]) -> Table:
     rows = []
     for (h, s), (gauss, gauss_error, hbvm, hbvm_error) in PRINTED.items():
-        found = [cells[h, s][key] for key in ("gauss", "hbvm", "hbvm_short")]
-        points = (POINT(float(gauss)), POINT(found[0].c), POINT(float(hbvm)), POINT(found[1].c))
-        errors = [number(one, 3) for one in (gauss_error, found[0].error, hbvm_error, found[1].error)]
-        ratio, short = f"{found[0].error / gauss_error:.2f}", number(found[2].error, 3)
+        edges = [cells[h, s][key] for key in ("gauss", "hbvm", "hbvm_short")]
+        points = (POINT(float(gauss)), POINT(edges[0].c), POINT(float(hbvm)), POINT(edges[1].c))
+        errors = [number(value, 3) for value in (gauss_error, edges[0].error, hbvm_error, edges[1].error)]
+        ratio, short = f"{edges[0].error / gauss_error:.2f}", number(edges[2].error, 3)
         entry = (f"{h:g}", str(s), str(NODES[s]))
         rows.append((*entry, *points[:2], *errors[:2], ratio, *points[2:], *errors[2:], short))
     pair = ("c, paper", "c, here", "error, paper", "error, here")
@@ -206,8 +206,8 @@ def _spread_table(spreads: Mapping[Key, Sequence[float]]) -> Table:
     rows = []
     for (h, s), errors in spreads.items():
         printed, middle = PRINTED[h, s][1], float(np.median(errors))
-        found = (printed, errors[0], min(errors), middle, max(errors))
-        rows.append((f"{h:g}", str(s), *(number(one, 3) for one in found), f"{middle / printed:.2f}"))
+        values = (printed, errors[0], min(errors), middle, max(errors))
+        rows.append((f"{h:g}", str(s), *(number(value, 3) for value in values), f"{middle / printed:.2f}"))
     return Table(
         "The random part of a Gauss entry",
         ("h", "s", "paper", "Q = (0, 1)", "smallest", "median", "largest", "median/paper"),
@@ -257,13 +257,13 @@ def closeup(figure: Figure, orbits: Mapping[str, Path]) -> Said:
     left, right = figure.subplots(1, 2, width_ratios=[1.1, 1])
     q, p, values = _levels((P1[0] - 0.05, P1[0] + 0.16), (P1[1] - 0.06, P1[1] + 0.13), 161)
     right.contour(q, p, values, levels=[H_STAR], colors=INK, linewidths=1.0)
-    found = []
+    numbers = []
     for family, width in (("gauss", 0.5), ("hbvm", 1.4)):
         (t, y), name = orbits[family], repr(DRAWN[family])
         h, look = energy(y), {"color": COLOURS[family], "rasterized": True}
         left.plot(t, h - h[0], linewidth=width, label=name, **look)
         right.plot(*y.T, ".", markersize=2.6, **look)
-        found += [name, np.ptp(h), _nearest((t, y))]
+        numbers += [name, np.ptp(h), _nearest((t, y))]
     left.set(xlim=(0, SPAN), xlabel="time", ylabel="H(qₙ, pₙ) − H(q₀, p₀)")
     left.ticklabel_format(axis="y", style="sci", scilimits=(0, 0), useMathText=True)
     legend_above(left)
@@ -274,7 +274,7 @@ def closeup(figure: Figure, orbits: Mapping[str, Path]) -> Said:
     return (
         "Left: the error of the Hamiltonian. Right: the orbits near the saddle, where the line is the "
         "loop H*. Gauss scatters about it; the points of HBVM lie on it and run into P₁.",
-        "{}: H varies by {:.1e}, closest to P1 {:.1e}; {}: {:.1e}, {:.1e}.".format(*found),
+        "{}: H varies by {:.1e}, closest to P1 {:.1e}; {}: {:.1e}, {:.1e}.".format(*numbers),
     )
 
 

@@ -48,7 +48,7 @@ def _collocation(residuals: Sequence[Row], defects: Sequence[tuple[str, float]])
     defect = "|MᵀJM − J|, M the derivative of one step"
     return Table(
         "Extended collocation conditions, and what is not symplectic",
-        ("method", "what", "defect"),
+        ("method", "quantity", "defect"),
         [
             *((f"HBVM(k={k}, s={s}, h=0.5)", residual, number(value)) for k, s, value in residuals),
             *((method, defect, number(value)) for method, value in defects),

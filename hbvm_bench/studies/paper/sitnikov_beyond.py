@@ -122,10 +122,10 @@ def _losses(axes: Axes, rows: Sequence[StepRow]) -> None:
 
 def step_table(rows: Sequence[StepRow]) -> Table:
     """Return the table behind `by_step`: Gauss and HBVM side by side, a line per degree and step."""
-    found = {(row.s, row.h, row.family): row for row in rows}
+    row_of = {(row.s, row.h, row.family): row for row in rows}
     lines = []
     for s, h in dict.fromkeys((row.s, row.h) for row in rows):
-        pair = [found[s, h, family] for family in ("gauss", "hbvm")]
+        pair = [row_of[s, h, family] for family in ("gauss", "hbvm")]
         columns = zip(*(_cells(row) for row in pair), strict=True)
         lines.append((str(s), FRACTIONS.get(h, f"{h:g}"), *(cell for both in columns for cell in both)))
     heads = (

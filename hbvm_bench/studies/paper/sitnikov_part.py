@@ -176,7 +176,7 @@ def dynamics(steps: Sequence[StepRow], growth: Sequence[Growth]) -> list[Claim]:
     coarse, finer = row(steps, "hbvm", sitnikov.H), row(steps, "hbvm", 1 / 8)
     fits = [r for r in steps if r.family == "hbvm" and r.s == 2 and r.h <= 0.25]
     order = float(np.polyfit(np.log([r.h for r in fits]), np.log([abs(r.turn) for r in fits]), 1)[0])
-    at = min(growth, key=lambda found: abs(found.e - sitnikov.E))
+    at = min(growth, key=lambda entry: abs(entry.e - sitnikov.E))
     limit = chaotic_from(growth)
     regular = limit is None or limit > sitnikov.E
     largest = {family: kept(steps, family) for family in ("gauss", "hbvm")}
@@ -211,7 +211,7 @@ def dynamics(steps: Sequence[StepRow], growth: Sequence[Growth]) -> list[Claim]:
 
 def row(steps: Sequence[StepRow], family: str, h: float) -> StepRow:
     """Return the row of a family with s = 2 and step h."""
-    return next(found for found in steps if (found.family, found.h, found.s) == (family, h, 2))
+    return next(entry for entry in steps if (entry.family, entry.h, entry.s) == (family, h, 2))
 
 
 def chaotic_from(growth: Sequence[Growth]) -> float | None:
@@ -220,9 +220,9 @@ def chaotic_from(growth: Sequence[Growth]) -> float | None:
     That of a regular orbit falls as log t / t, here by a factor ten between the two
     spans; half is the line.
     """
-    for found in growth:
-        if found.left is not None or found.along[-1][1] > 0.5 * found.along[0][1]:
-            return found.e
+    for entry in growth:
+        if entry.left is not None or entry.along[-1][1] > 0.5 * entry.along[0][1]:
+            return entry.e
     return None
 
 
@@ -261,7 +261,7 @@ def _both_laws(runs: Mapping[str, Orbit]) -> str | None:
 
 
 def _plainly(results: Results) -> str:
-    found = row(_steps(results), "hbvm", sitnikov.H)
+    result = row(_steps(results), "hbvm", sitnikov.H)
     paper, ours = (
         results.records[text].result for text in ("HBVM(k=18, s=2, h=0.5)", "HBVM(k=16, s=8, h=0.125)")
     )
@@ -269,8 +269,8 @@ def _plainly(results: Results) -> str:
     off = number(ours.metrics["z_error"].value)
     return (
         "What HBVM(18,2) with h = 1/2 gets right: the energy, the length of the primaries' axis and with "
-        f"it their period (to {number(found.slow)}), a planetoid that stays. What it gets wrong: the "
-        f"direction of the ellipses, which turn by {found.turn:.1f} degrees per revolution, the angular "
+        f"it their period (to {number(result.slow)}), a planetoid that stays. What it gets wrong: the "
+        f"direction of the ellipses, which turn by {result.turn:.1f} degrees per revolution, the angular "
         "momentum, and the planetoid's phase: after a few hundred units of time its height has nothing to "
         "do with the true one. Nor is the method symplectic. A higher order with a smaller step gets all "
         f"of it right: HBVM(16,8) with h = 1/8 has z at t = 1500 to {off}, for {share:.2f} "
@@ -303,8 +303,8 @@ def _row(record: Record) -> others.Row:
     if group_of(record) == "ended":
         refused = record.result.outcome == "refused"
         return others.Row(record.case.method, {}, record.result.reason if refused else status_of(record))
-    found = ((name, record.result.metrics.get(name, Value()).value) for name in METRICS)
-    numbers = {name: value for name, value in found if value is not None}
+    pairs = ((name, record.result.metrics.get(name, Value()).value) for name in METRICS)
+    numbers = {name: value for name, value in pairs if value is not None}
     return others.Row(record.case.method, numbers, _remark(numbers))
 
 

@@ -109,7 +109,7 @@ class BatchProgram(Program):
                 status=[Status.FINISHED] * n,
                 reason=[""] * n,
                 t_stop=np.full(n, times[-1]),
-                steps=np.array([one[3] for one in ended[:n]]),
+                steps=np.array([outcome[3] for outcome in ended[:n]]),
             )
 
         return go
@@ -129,13 +129,13 @@ class BatchProgram(Program):
 def _heyoka(system: System, method: MethodBase) -> Begin:
     """``taylor_adaptive(...).propagate_until(t_end)``."""
     hy = load("heyoka")
-    made = hy.taylor_adaptive(
+    integrator = hy.taylor_adaptive(
         emit.heyoka(system), [0.0] * system.dim, pars=[0.0] * system.n_par, **method.options(defaults=True)
     )
 
     def begin(y0: Array, par: Array, t0: float) -> Call:
-        made.time, made.state[:], made.pars[:] = t0, y0, par
-        return Call(made.propagate_until, lambda ended: (ended[3], made.state.copy()))
+        integrator.time, integrator.state[:], integrator.pars[:] = t0, y0, par
+        return Call(integrator.propagate_until, lambda ended: (ended[3], integrator.state.copy()))
 
     return begin
 
@@ -184,7 +184,7 @@ def _rebound(system: System, method: Any) -> Begin:
                 particle.vx, particle.vy, particle.vz = (v / unit for v in particle.vxyz)
             return _in_one_go(sim, chosen, h, t0)
 
-        def end(made: None) -> tuple[int, Array]:
+        def end(nothing: None) -> tuple[int, Array]:
             q = np.array([particle.xyz for particle in sim.particles])
             v = np.array([particle.vxyz for particle in sim.particles])
             if not bodies:
@@ -319,10 +319,13 @@ def _sundae(system: System, method: Any) -> Begin:
             matrix[pattern.rows, pattern.columns] = values
 
         options = {} if entries is None else {"jacfn": jac}
-        made = solver(
+        integrator = solver(
             f, rtol=method.rtol, atol=method.atol, method=method.method, max_num_steps=2**31 - 1, **options
         )
-        return Call(lambda t_end: made.solve([t0, t_end], y0), lambda found: (found.t.size - 1, found.y[-1]))
+        return Call(
+            lambda t_end: integrator.solve([t0, t_end], y0),
+            lambda solution: (solution.t.size - 1, solution.y[-1]),
+        )
 
     return begin
 
@@ -347,7 +350,7 @@ def _pyhamsys(system: System, method: Any) -> Begin:
                 params=library.Parameters(step=step, solver=method.type),
             )
 
-        return Call(go, lambda found: (round((found.t[-1] - t0) / found.step), found.y[:, -1]))
+        return Call(go, lambda solution: (round((solution.t[-1] - t0) / solution.step), solution.y[:, -1]))
 
     return begin
 

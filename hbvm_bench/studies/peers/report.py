@@ -57,7 +57,7 @@ class Pair:
     @property
     def failed(self) -> str:
         """Why there is nothing to compare; empty where there is."""
-        return next((reason for one in (self.bench, self.alone) if (reason := reason_of(one))), "")
+        return next((reason for record in (self.bench, self.alone) if (reason := reason_of(record))), "")
 
     @property
     def beyond(self) -> bool:
@@ -66,32 +66,34 @@ class Pair:
         far = self.difference is not None and not self.difference <= DIFFERENCE
         if far or bench is None or alone is None or abs(bench - alone) > A_STEP:
             return True
-        spent = [one.timing.summary.get("median", 0.0) for one in (self.bench, self.alone) if one.timing]
+        spent = [
+            record.timing.summary.get("median", 0.0) for record in (self.bench, self.alone) if record.timing
+        ]
         slow = self.ratio is not None and self.ratio.median > ALLOWED
         return slow and spent[0] - spent[-1] > OVERHEAD
 
 
 def pairs(results: Results, run: Kept) -> list[Pair]:
     """Return every method of a run with its library alone, in the order of the campaign."""
-    found = []
+    result = []
     for task, records in tasks(run.records).items():
-        alone = {one.case.method.removeprefix(ALONE): one for one in records if _is_alone(one)}
-        for one in records:
-            if not _is_alone(one) and one.case.method in alone:
-                other = alone[one.case.method]
-                found.append(Pair(task, one, other, _difference(results, one, other)))
-    return found
+        alone = {record.case.method.removeprefix(ALONE): record for record in records if _is_alone(record)}
+        for record in records:
+            if not _is_alone(record) and record.case.method in alone:
+                other = alone[record.case.method]
+                result.append(Pair(task, record, other, _difference(results, record, other)))
+    return result
 
 
-def healthy(found: Sequence[Pair]) -> bool:
+def healthy(measured: Sequence[Pair]) -> bool:
     """Whether every pair ran and none is beyond what is allowed."""
-    return bool(found) and not any(pair.failed or pair.beyond for pair in found)
+    return bool(measured) and not any(pair.failed or pair.beyond for pair in measured)
 
 
-def table(found: Sequence[Pair]) -> Table:
+def table(measured: Sequence[Pair]) -> Table:
     """Return the pairs as a table; those beyond what is allowed are marked."""
     rows = []
-    for pair in found:
+    for pair in measured:
         if pair.failed:
             continue
         ratio, timing = pair.ratio, pair.alone.timing
@@ -128,19 +130,23 @@ def table(found: Sequence[Pair]) -> Table:
 def costs(results: Results) -> list[Section]:
     """Return for each kind of processor the table, what did not run, and where it was measured."""
     return [
-        Section(kind, [one for run in runs for one in _run(results, run)], key=kind, nav=kind)
+        Section(kind, [part for run in runs for part in _run(results, run)], key=kind, nav=kind)
         for kind, runs in results.by_processor.items()
     ]
 
 
 def _run(results: Results, run: Kept) -> list[Block]:
-    found = pairs(results, run)
-    refused = [f"{one.bench.case.method} on {one.task.problem}: {one.failed}" for one in found if one.failed]
+    measured_pairs = pairs(results, run)
+    refused = [
+        f"{pair.bench.case.method} on {pair.task.problem}: {pair.failed}"
+        for pair in measured_pairs
+        if pair.failed
+    ]
     libraries = ", ".join(f"{name} {number}" for name, number in run.versions.items())
     said = [machine.sentence(run.machine), *outcomes.beside(run.records)]
     why: list[Block] = ["Not run:", Items(refused)] if refused else []
     measured = f"Measured on {run.started[:10]} with {libraries}: `{run.command}`"
-    return [table(found), *why, Note(" ".join(said)), measured]
+    return [table(measured_pairs), *why, Note(" ".join(said)), measured]
 
 
 def _is_alone(record: Record) -> bool:
@@ -148,7 +154,7 @@ def _is_alone(record: Record) -> bool:
 
 
 def _difference(results: Results, bench: Record, alone: Record) -> float | None:
-    ends = [results.series[one.id].get("y", np.empty(0)) for one in (bench, alone)]
+    ends = [results.series[record.id].get("y", np.empty(0)) for record in (bench, alone)]
     if not all(end.size for end in ends) or ends[0].shape != ends[1].shape:
         return None
     if bench.case.ensemble is None:

@@ -27,7 +27,7 @@ SECONDS = "seconds per integration (median)"
 @styled
 def work_precision(race: Race, look: Mapping[str, Look]) -> Picture | None:
     """Draw errors against time; ``None`` without a setting that may be compared."""
-    counted = ((row, [one for one in records if counts(one)]) for row, records in race.rows.items())
+    counted = ((row, [record for record in records if counts(record)]) for row, records in race.rows.items())
     rows = {row: records for row, records in counted if records}
     if not rows:
         return None
@@ -134,10 +134,10 @@ def _summary(race: Race) -> str:
     energy, position = race.asked
     said = []
     for row in race.rows:
-        found = race.best(row, energy, position)
+        best = race.best(row, energy, position)
         said.append(
             f"{row.title}, does not reach it"
-            if found is None
-            else f"{row.title}, takes {_seconds(found):.3g} s"
+            if best is None
+            else f"{row.title}, takes {_seconds(best):.3g} s"
         )
     return f"With an energy error of {energy:.0e} and a position error of {position:.0e}: {'; '.join(said)}."

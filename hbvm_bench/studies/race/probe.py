@@ -78,25 +78,25 @@ def probe(name: str, problem: str, h: float, families: Sequence[str]) -> list[Pr
     Families that compile nothing are left out.
     """
     return [
-        made
+        entry
         for family in families
         for template in METHODS.get(family, ())
-        for made in _probes(name, problem, family, template.format(h=h))
+        for entry in _probes(name, problem, family, template.format(h=h))
     ]
 
 
 def _probes(name: str, problem: str, family: str, method: str) -> list[Probe]:
-    found: dict[str, list[tuple[float, Answer]]] = {"empty": [], "kernel": [], "full": []}
+    replies: dict[str, list[tuple[float, Answer]]] = {"empty": [], "kernel": [], "full": []}
     try:
         for _ in range(TIMES):
             with tempfile.TemporaryDirectory(prefix="hbvm-bench-") as cache:
-                found["empty"].append(_ask(problem, method, Path(cache)))
-                found["full"].append(_ask(problem, method, Path(cache)))
+                replies["empty"].append(_ask(problem, method, Path(cache)))
+                replies["full"].append(_ask(problem, method, Path(cache)))
             if family == OURS:
                 with tempfile.TemporaryDirectory(prefix="hbvm-bench-") as cache:
                     _ask(OTHER, method, Path(cache))
-                    found["kernel"].append(_ask(problem, method, Path(cache)))
-            if found["empty"][0][0] > SLOW:
+                    replies["kernel"].append(_ask(problem, method, Path(cache)))
+            if replies["empty"][0][0] > SLOW:
                 break
     except (subprocess.SubprocessError, msgspec.MsgspecError) as error:
         reason = f"the process that compiles {method} failed: {type(error).__name__}"
@@ -112,7 +112,7 @@ def _probes(name: str, problem: str, family: str, method: str) -> list[Probe]:
             from_cache=answers[0][1].from_cache,
             reason=answers[0][1].refused,
         )
-        for caches, answers in found.items()
+        for caches, answers in replies.items()
         if answers
     ]
 

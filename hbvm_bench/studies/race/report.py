@@ -15,7 +15,7 @@ from hbvm_bench.report.provenance import again
 from hbvm_bench.studies.race import tables
 from hbvm_bench.studies.race.families import FAMILIES
 from hbvm_bench.studies.race.figures import work_precision
-from hbvm_bench.studies.race.results import Race, by_kind, declared, of
+from hbvm_bench.studies.race.results import Race, by_kind, declared, races_of
 from hbvm_bench.summaries import outcomes
 from hbvm_bench.summaries.table import Table
 
@@ -61,8 +61,8 @@ def rules(races: Sequence[Race]) -> list[str]:
     """Return the rules under which these races were run, as their own files had them."""
     asked = [race.run.index.campaign for race in races]
     said = RULES_TEXT.format(
-        shortest=_each(f"{one.timing.shortest * 1e3:.0f}" for one in asked),
-        count=_each(str(one.grid.count) for one in asked),
+        shortest=_each(f"{campaign.timing.shortest * 1e3:.0f}" for campaign in asked),
+        count=_each(str(campaign.grid.count) for campaign in asked),
         position=POSITION,
     )
     return [" ".join(paragraph.split()) for paragraph in said.strip().split("\n\n")]
@@ -75,45 +75,45 @@ def _each(values: Iterable[str]) -> str:
 @block
 def machines(results: Results) -> list[Note]:
     """Return what the times were taken on."""
-    races = sorted(of(results), key=lambda race: race.started)
+    races = sorted(races_of(results), key=lambda race: race.started)
     return [Note(said) for said in machine.sentences(race.machine for race in races)]
 
 
 @block
 def overview(results: Results) -> Table:
     """Return the fastest setting on every problem, and all methods relative to it."""
-    return tables.overview(of(results))
+    return tables.overview(races_of(results))
 
 
 @block
 def ratios(results: Results) -> Table:
     """Return the other libraries' best times over those of HBVM and Gauss."""
-    return tables.headline(of(results))
+    return tables.headline(races_of(results))
 
 
 @block
 def kinds(results: Results) -> Table | None:
     """Return the same by the kind of processor, where there are several."""
-    found = by_kind(results)
-    return tables.kinds(found) if len(found) > 1 else None
+    races_of = by_kind(results)
+    return tables.kinds(races_of) if len(races_of) > 1 else None
 
 
 @block
 def goals(results: Results) -> Table:
     """Return what was asked for before, and what was measured."""
-    return tables.goals(of(results))
+    return tables.goals(races_of(results))
 
 
 @block
 def behind(results: Results) -> Table:
     """Return the settings whose times are compared."""
-    return tables.behind(of(results))
+    return tables.behind(races_of(results))
 
 
 @block
 def contests(results: Results) -> list[Section]:
     """Return the section of each problem."""
-    races = of(results)
+    races = races_of(results)
     navs = tables.short([race.title for race in races])
     return [section(race, results.look, nav) for race, nav in zip(races, navs, strict=True)]
 
@@ -121,7 +121,7 @@ def contests(results: Results) -> list[Section]:
 @block
 def terms(results: Results) -> Section:
     """Return by what rules they competed."""
-    races = of(results)
+    races = races_of(results)
     ran = {name for race in races for name in race.families}
     families = [f"{family.title}: {family.code}" for name, family in FAMILIES.items() if name in ran]
     blocks = [
@@ -135,7 +135,7 @@ def terms(results: Results) -> Section:
 @block
 def run_again(results: Results) -> Section:
     """Return the commands, and what was measured with what."""
-    races = sorted(of(results), key=lambda race: race.started)
+    races = sorted(races_of(results), key=lambda race: race.started)
     days = ", ".join(sorted({race.started[:10] for race in races}))
     return again(commands(races), days, races[-1].machine, races[-1].run.versions)
 
@@ -173,7 +173,7 @@ def remarks(race: Race) -> list[str]:
     absent = [
         FAMILIES[family].title
         for family in race.families
-        if all(one.result.outcome == "refused" for one in race.of(family))
+        if all(record.result.outcome == "refused" for record in race.settings(family))
     ]
     if absent:
         said.append(f"Does not apply: {', '.join(absent)}.")

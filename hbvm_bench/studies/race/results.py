@@ -68,27 +68,29 @@ class Race:
     @property
     def calibration(self) -> list[float]:
         """Seconds of the calibration loop, round by round."""
-        rounds = [one for record in self.records if record.timing for one in record.timing.rounds]
-        found = {one.number: one.calibration[0] for one in rounds if one.calibration}
-        return [found[place] for place in sorted(found, key=lambda place: place or 0)]
+        rounds = [round_ for record in self.records if record.timing for round_ in record.timing.rounds]
+        seconds = {round_.number: round_.calibration[0] for round_ in rounds if round_.calibration}
+        return [seconds[place] for place in sorted(seconds, key=lambda place: place or 0)]
 
     @property
     def machine(self) -> dict[str, str | int]:
         """Where it was timed."""
-        return next((one.timing.machine for one in self.records if one.timing), self.records[0].machine)
+        return next(
+            (record.timing.machine for record in self.records if record.timing), self.records[0].machine
+        )
 
     @property
     def started(self) -> str:
         """When the first of its cases had ended."""
-        return min(one.finished for one in self.records)
+        return min(record.finished for record in self.records)
 
     @cached_property
     def rows(self) -> dict[Row, list[Record]]:
         """The settings by row, in the order of declaration."""
-        found: dict[Row, list[Record]] = {}
+        records_of: dict[Row, list[Record]] = {}
         for record in self.records:
-            found.setdefault(row_of(record.case), []).append(record)
-        return found
+            records_of.setdefault(row_of(record.case), []).append(record)
+        return records_of
 
     @property
     def families(self) -> list[str]:
@@ -118,7 +120,7 @@ class Race:
         compared = [record for records in self.competing.values() for record in records]
         return verdicts(self.run.index.campaign, compared)
 
-    def of(self, who: str | Row) -> list[Record]:
+    def settings(self, who: str | Row) -> list[Record]:
         """Return all settings of a family, or of one of its rows."""
         return self.rows.get(who, []) if isinstance(who, Row) else standings.among(self.records, who)
 
@@ -127,7 +129,7 @@ class Race:
 
         Of a row it is chosen from all settings, of a family from those that compete.
         """
-        able = self.of(who) if isinstance(who, Row) else self.competing.get(who, [])
+        able = self.settings(who) if isinstance(who, Row) else self.competing.get(who, [])
         return standings.best(able, {ENERGY: energy, POSITION: position})
 
     def at(self, family: str, energy: float, position: float) -> Comparison:
@@ -148,7 +150,7 @@ def declared() -> Campaign:
     return load_campaign(NAME)
 
 
-def of(results: Results) -> list[Race]:
+def races_of(results: Results) -> list[Race]:
     """Return the contests of the processor that was measured last, in the order of declaration."""
     return by_kind(results)[machine.kind(results.runs[-1].machine)]
 
@@ -173,11 +175,13 @@ def probes(results: Results) -> list[Probe]:
 
 
 def _contests(runs: Sequence[Kept], measured: Sequence[Probe]) -> list[Race]:
-    found = {
-        name_of(entry): Race(entry, run, records, [one for one in measured if one.problem == name_of(entry)])
+    races = {
+        name_of(entry): Race(
+            entry, run, records, [probe for probe in measured if probe.problem == name_of(entry)]
+        )
         for run in runs
         for entry, records in standings.entries(run.index.campaign, run.records)
         if records
     }
     order = [name_of(entry) for entry in declared().entries()]
-    return sorted(found.values(), key=lambda race: order.index(race.key) if race.key in order else len(order))
+    return sorted(races.values(), key=lambda race: order.index(race.key) if race.key in order else len(order))

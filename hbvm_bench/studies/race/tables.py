@@ -41,7 +41,7 @@ def headline(races: Sequence[Race]) -> Table:
             (
                 race.title,
                 f"{power(energy)}, {power(position)}",
-                *("not reached" if one is None else time_of(one) for one in best),
+                *("not reached" if record is None else time_of(record) for record in best),
                 *(_headline_cell(race, peer, race.at(peer, energy, position)) for peer in peers),
             )
         )
@@ -70,7 +70,7 @@ def behind(races: Sequence[Race]) -> Table:
     rows = []
     for race in races:
         best = (race.best(family, *race.asked) for family in (OURS, *peers))
-        rows.append((race.title, *(NONE if one is None else one.case.method for one in best)))
+        rows.append((race.title, *(NONE if record is None else record.case.method for record in best)))
     return Table(
         "The settings behind these ratios",
         ("problem", "HBVM and Gauss", *(FAMILIES[peer].short for peer in peers)),
@@ -85,13 +85,16 @@ def overview(races: Sequence[Race]) -> Table:
     rows = []
     for race, title in zip(races, short([race.title for race in races]), strict=True):
         within: dict[str, float] = dict(zip(ERRORS, race.asked, strict=True))
-        able = {one: standings.among(race.records, one) for one in ("HBVM", "Gauss")} | race.competing
+        able = {
+            record: standings.among(race.records, record) for record in ("HBVM", "Gauss")
+        } | race.competing
         best = {name: standings.best(able.get(name, []), within) for name in shown}
-        first = standings.best([one for one in best.values() if one is not None], within)
+        first = standings.best([record for record in best.values() if record is not None], within)
         if first is None:
             continue
         cells = [
-            NONE if one is None else "1" if one is first else _relative(first, one) for one in best.values()
+            NONE if record is None else "1" if record is first else _relative(first, record)
+            for record in best.values()
         ]
         rows.append((title, first.case.method, time_of(first).partition(" (")[0], *cells))
     kept = [i for i in range(3 + len(shown)) if any(row[i] != NONE for row in rows)]
@@ -112,8 +115,8 @@ def short(titles: Sequence[str]) -> list[str]:
     """Return as much of every title as tells it from the others: what is before its first or second comma."""
     begun = [title.split(",")[0] for title in titles]
     return [
-        one if begun.count(one) == 1 else ",".join(title.split(",")[:2])
-        for one, title in zip(begun, titles, strict=True)
+        title_ if begun.count(title_) == 1 else ",".join(title.split(",")[:2])
+        for title_, title in zip(begun, titles, strict=True)
     ]
 
 
@@ -160,17 +163,17 @@ def fastest(race: Race) -> Table:
     ours = race.best(OURS, energy, position)
     rows = []
     for row in race.rows:
-        found = race.best(row, energy, position)
-        if found is None:
+        best = race.best(row, energy, position)
+        if best is None:
             rows.append((row.title, _why_none(race, row), *[NONE] * 6))
             continue
-        ratio = "1" if found is ours else ratio_text(standings.compare(ours, found, chosen=True).ratio)
+        ratio = "1" if best is ours else ratio_text(standings.compare(ours, best, chosen=True).ratio)
         rows.append(
             (
                 row.title,
-                found.case.method,
-                time_of(found),
-                *(format_metric(found, key) for key in SHOWN),
+                best.case.method,
+                time_of(best),
+                *(format_metric(best, key) for key in SHOWN),
                 ratio,
             )
         )
@@ -215,18 +218,18 @@ def defaults(race: Race) -> Table | None:
     """Return the default settings beside the fastest of HBVM and Gauss that is as accurate, or ``None``."""
     rows = []
     for family in race.families:
-        found = standings.untuned(race.records, family, ERRORS)
-        if found.theirs is None:
+        comparison = standings.untuned(race.records, family, ERRORS)
+        if comparison.theirs is None:
             continue
-        ours = found.ours
+        ours = comparison.ours
         rows.append(
             (
-                found.theirs.case.method,
-                time_of(found.theirs),
-                *(format_metric(found.theirs, key) for key in ERRORS),
+                comparison.theirs.case.method,
+                time_of(comparison.theirs),
+                *(format_metric(comparison.theirs, key) for key in ERRORS),
                 ours.case.method if ours else "none is as accurate",
                 time_of(ours) if ours else NONE,
-                ratio_text(found.ratio),
+                ratio_text(comparison.ratio),
             )
         )
     if not rows:
@@ -293,30 +296,34 @@ def time_of(record: Record) -> str:
     taken = record.timing.samples if record.timing is not None else []
     if not taken:
         return NONE
-    time = Spread.of(taken)
+    time = Spread.from_samples(taken)
     spread = "" if time.low is None or time.high is None else f" ({seconds(time.low)} – {seconds(time.high)})"
     return f"{seconds(time.median)}{spread}"
 
 
-def _headline_cell(race: Race, peer: str, found: Comparison) -> str:
+def _headline_cell(race: Race, peer: str, comparison: Comparison) -> str:
     if peer not in race.families:
         return NONE
-    if found.theirs is None:
+    if comparison.theirs is None:
         return _why_none(race, peer)
-    return ratio_text(found.ratio) if found.ours is not None else "reached only by the other library"
+    return (
+        ratio_text(comparison.ratio) if comparison.ours is not None else "reached only by the other library"
+    )
 
 
-def _level_cell(found: Comparison) -> str:
-    if found.theirs is None:
+def _level_cell(comparison: Comparison) -> str:
+    if comparison.theirs is None:
         return "not reached"
-    return ratio_text(found.ratio) if found.ours is not None else f"{time_of(found.theirs)} alone"
+    return (
+        ratio_text(comparison.ratio) if comparison.ours is not None else f"{time_of(comparison.theirs)} alone"
+    )
 
 
 def _why_none(race: Race, who: str | Row) -> str:
-    records = race.of(who)
-    if records and all(one.result.outcome == "refused" for one in records):
+    records = race.settings(who)
+    if records and all(record.result.outcome == "refused" for record in records):
         return "does not apply"
-    if records and not any(counts(one) for one in records):
+    if records and not any(counts(record) for record in records):
         return "no valid run"
     return "not reached"
 

@@ -130,9 +130,9 @@ def test_data_that_are_not_what_their_name_says_are_refused(folder):
     plain = json.loads(text)
     plain["arrays"]["array_0"][1] = 2.0
     with pytest.raises(ValueError, match="not the one that its name says"):
-        own.learn(own.Beside(formula=json.dumps(plain)))
+        own.add_known(own.Beside(formula=json.dumps(plain)))
     with pytest.raises(ValueError, match="it has no symbol"):  # a text that would be printed into code
-        own.learn(own.Beside(formula=text.replace('["y", 0]', '["print(1) or y", 0]')))
+        own.add_known(own.Beside(formula=text.replace('["y", 0]', '["print(1) or y", 0]')))
 
 
 @pytest.mark.parametrize(

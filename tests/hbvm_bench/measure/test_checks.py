@@ -102,7 +102,7 @@ def test_an_ensemble_is_measured_against_the_ends_of_its_witnesses():
     assert metrics["position_end"].value < 1e-14  # 1.6e-16 measured
     assert metrics["energy_max"].value < 1e-14  # 3.4e-16 measured
     assert metrics["throughput"].why == "not timed"
-    run = EnsembleRun.of(problem, Gauss(s=8, h=0.5), program, asked)
+    run = EnsembleRun.compiled(problem, Gauss(s=8, h=0.5), program, asked)
     timed = time_alone(run, TimingPlan(samples=2, budget=1))
     assert len(timed.samples) == 2
     # a method without a batch path takes one after the other, to the same end

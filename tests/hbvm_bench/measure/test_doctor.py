@@ -12,10 +12,10 @@ from hbvm_bench.measure import doctor, machine
 
 
 def test_everything_that_is_installed_has_its_version():
-    found = {one.what: one for one in doctor.examine(calibration=False)["installed"]}
+    found = {one.subject: one for one in doctor.examine(calibration=False)["installed"]}
     peers = {"heyoka", "rebound", "diffrax", "pyhamsys", "scikit-sundae"}
     assert {"hbvm-bench", "distributed", "pyarrow", "browser"} | peers == found.keys()
-    assert all(one.found for one in found.values())
+    assert all(one.observed for one in found.values())
     assert found["hbvm-bench"].state == "ok"
 
 
@@ -24,24 +24,24 @@ def test_a_missing_peer_is_bad_and_a_missing_extra_is_a_note(monkeypatch):
         raise PackageNotFoundError(name)
 
     monkeypatch.setattr(doctor, "version", version)
-    found = {one.what: one for one in doctor.libraries()}
+    found = {one.subject: one for one in doctor.libraries()}
     assert (found["heyoka"].state, found["pyarrow"].state) == ("bad", "note")
     assert found["rebound"].advice == "pip install 'hbvm-bench[peers]'"
     assert not doctor.healthy({"installed": list(found.values())})
 
 
 def test_methods_of_third_parties_are_listed_and_broken_ones_are_bad(toys, monkeypatch):
-    found = {one.what: one for one in doctor.methods()}
-    assert (found["Steady"].state, found["Steady"].found) == ("ok", "toys 1.0")
+    found = {one.subject: one for one in doctor.methods()}
+    assert (found["Steady"].state, found["Steady"].observed) == ("ok", "toys 1.0")
     assert "HBVM" not in found
 
     def get(name):
         raise RuntimeError("half-installed")
 
     monkeypatch.setattr(integrators.registry, "get", get)
-    broken = {one.what: one for one in doctor.methods()}
+    broken = {one.subject: one for one in doctor.methods()}
     assert broken["Steady"].state == "bad"
-    assert "RuntimeError: half-installed" in broken["Steady"].found
+    assert "RuntimeError: half-installed" in broken["Steady"].observed
 
 
 @pytest.mark.parametrize(
@@ -64,7 +64,7 @@ def test_what_else_runs_is_seen(monkeypatch):
     monkeypatch.setattr(doctor, "_running", lambda: 1)
     assert doctor.load().state == "ok"
     monkeypatch.setattr(doctor, "_running", lambda: 3)
-    assert (doctor.load().state, doctor.load().found[:29]) == ("bad", "2 other processes want to run")
+    assert (doctor.load().state, doctor.load().observed[:29]) == ("bad", "2 other processes want to run")
     some = itertools.cycle([1, 1, 2])  # what runs for a moment only
     monkeypatch.setattr(doctor, "_running", lambda: next(some))
     assert doctor.load().state == "ok"
@@ -72,13 +72,13 @@ def test_what_else_runs_is_seen(monkeypatch):
 
 def test_governors_are_read_where_the_system_shows_them(monkeypatch, tmp_path):
     monkeypatch.setattr(doctor, "SYSTEM", tmp_path)
-    assert "not visible" in doctor.governor().found
-    assert "not visible" in doctor.boost().found
+    assert "not visible" in doctor.governor().observed
+    assert "not visible" in doctor.boost().observed
     for core, name in enumerate(("performance", "powersave")):
         path = tmp_path / f"cpu{core}" / "cpufreq" / "scaling_governor"
         path.parent.mkdir(parents=True)
         path.write_text(f"{name}\n")
-    assert (doctor.governor().found, doctor.governor().state) == ("performance, powersave", "note")
+    assert (doctor.governor().observed, doctor.governor().state) == ("performance, powersave", "note")
     (tmp_path / "cpu1/cpufreq/scaling_governor").write_text("performance\n")
     assert doctor.governor().state == "ok"
     (tmp_path / "cpufreq").mkdir()
@@ -105,7 +105,7 @@ def test_the_calibration_runs_on_one_core_and_gives_the_others_back():
         return 0.01
 
     findings = doctor.steadiness(measure)
-    assert [one.what for one in findings][:2] == ["calibration", "share"]
+    assert [one.subject for one in findings][:2] == ["calibration", "share"]
     assert set(map(tuple, seen)) == {(before[-1],)}
     assert machine.cores() == before
 

@@ -88,20 +88,20 @@ def test_a_run_does_not_know_the_reference_of_another_run(tmp_path):
     for name, end in (("one", [0.1, 0.2]), ("other", [0.3, 0.4])):
         solutions.forget()
         given[name] = solutions.of_end(problem, end)
-        solutions.know(solutions.encode(given[name]))
+        solutions.add_known(solutions.encode(given[name]))
         store = Store(tmp_path / name)
         store.prepare()
         store.keep(repr(problem))
     none = Store(tmp_path / "none")
     none.prepare()
     for store, expected in ((Store(tmp_path / "one"), given["one"]), (none, None)):
-        store.learn()
+        store.add_known()
         assert solutions.find_file(problem) == expected  # before: the last one that anybody had learned
 
 
 def test_a_task_of_another_run_leaves_what_is_known_here():
     problem = problems.load("pendulum", q=0.3, t_end=7.0)
-    solutions.know(solutions.encode(solutions.of_end(problem, [0.1, 0.2])))
+    solutions.add_known(solutions.encode(solutions.of_end(problem, [0.1, 0.2])))
     try:
         with solutions.apart():
             assert solutions.find_file(problem) is None

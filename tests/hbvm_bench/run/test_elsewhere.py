@@ -93,14 +93,14 @@ def test_a_worker_ends_with_its_parent_where_the_system_does_not_see_to_it():
 
 
 def test_psutil_tells_the_memory_that_the_system_tells(monkeypatch):
-    told = memory.of(os.getpid())
+    told = memory.of_process(os.getpid())
     monkeypatch.setattr(memory, "PROCESSES", Path("nowhere"))
-    assert memory.of(os.getpid()).resident == pytest.approx(told.resident, rel=0.1)
+    assert memory.of_process(os.getpid()).resident == pytest.approx(told.resident, rel=0.1)
     monkeypatch.setattr(memory, "resource", None)
     assert memory.own_peak() >= 0.9 * told.resident
     ended = subprocess.Popen([sys.executable, "-c", ""])
     ended.wait()
-    assert memory.of(ended.pid) == memory.Memory()
+    assert memory.of_process(ended.pid) == memory.Memory()
 
 
 def test_where_no_core_can_be_bound_all_are_used(monkeypatch):
@@ -118,8 +118,8 @@ def test_what_the_system_does_not_tell_is_no_finding_of_good_news(monkeypatch):
     monkeypatch.setattr(doctor, "STAT", Path("nowhere"))
     monkeypatch.setattr(machine, "_cpu", dict)
     assert timing.busy()[:2] == (3.0, 0.0)
-    assert [one.what for one in doctor.steadiness(lambda: 0.01)] == ["calibration", "share"]
-    assert [(one.state, one.found[:11]) for one in (doctor.load(), doctor.virtual())] == [
+    assert [one.subject for one in doctor.steadiness(lambda: 0.01)] == ["calibration", "share"]
+    assert [(one.state, one.observed[:11]) for one in (doctor.load(), doctor.virtual())] == [
         ("note", "not visible")
     ] * 2
     assert "family" not in machine.describe()

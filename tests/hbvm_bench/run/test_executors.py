@@ -228,7 +228,7 @@ def test_a_case_that_an_executor_loses_is_tried_twice_and_named_after_all_others
     chosen = cases(2)
     store = store_in(tmp_path / "run")
     with Losing(1) as executor:
-        records = loop.run_accuracy(chosen, store, LIMITS, executors.of(executor))
+        records = loop.run_accuracy(chosen, store, LIMITS, executors.pool_of(executor))
         assert next(records).id == chosen[0].id
         with pytest.raises(UnfinishedRunError, match="1 case could not be run: OSError: the machine"):
             next(records)

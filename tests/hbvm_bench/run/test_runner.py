@@ -149,7 +149,7 @@ def test_a_lost_symmetry_voids_position_and_time(toys, store):
 def test_cases_run_on_any_executor(toys, store):
     cases = [resolve(case(f"Steady(h={h})")) for h in (0.1, 0.2)]
     with concurrent.futures.ThreadPoolExecutor(2) as pool:
-        records = list(loop.run_accuracy(cases, store, GENEROUS, executors.of(pool)))
+        records = list(loop.run_accuracy(cases, store, GENEROUS, executors.pool_of(pool)))
     assert {record.id for record in records} == {one.id for one in cases}
 
 

@@ -41,7 +41,7 @@ def made(directory, years=1e6, starts=8, size=1e-17, bias=0.0):
     store.write_index(
         Index(campaign=campaign, ids=[case.id for case in cases], version="0", command="hbvm-bench endure")
     )
-    return endure.of(gather([store]))
+    return endure.measured_last(gather([store]))
 
 
 def drifted(case, t, errors, seconds):
@@ -121,7 +121,9 @@ def test_a_failed_trajectory_is_counted_and_not_averaged(tmp_path):
     _, peer = store.records()
     series = store.series(peer.id)
     store.save(peer, {**series, "drift.energy": series["drift.energy"][:2]})
-    assert [(line.starts, line.failed) for line in endure.lines(endure.of(gather([Store(tmp_path)])))] == [
+    assert [
+        (line.starts, line.failed) for line in endure.lines(endure.measured_last(gather([Store(tmp_path)])))
+    ] == [
         (3, 0),
         (2, 1),
     ]

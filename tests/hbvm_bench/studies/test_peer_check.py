@@ -126,7 +126,7 @@ def made_up(ratio=1.0, steps=5, seconds=0.03, difference=0.0):
         )
 
     bench, other = record("Taylor()", ratio * seconds, 5), record(f"{ALONE}Taylor()", seconds, steps)
-    return Pair(Task.of(bench.case), bench, other, difference)
+    return Pair(Task.from_case(bench.case), bench, other, difference)
 
 
 @pytest.mark.parametrize(

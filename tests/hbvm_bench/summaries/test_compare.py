@@ -79,7 +79,7 @@ def test_two_runs_of_the_same_have_no_change(tmp_path):
 def test_the_same_sources_on_the_same_machine_must_give_the_same_digits(tmp_path):
     second = make(tmp_path / "b", edit=lambda i, r: with_value(r, "position_end", 2.5e-7 * (1 + 1e-14)))
     found = compare(make(tmp_path / "a"), second)
-    assert [change.what for change in found.changed] == 3 * ["position error at the end"]
+    assert [change.quantity for change in found.changed] == 3 * ["position error at the end"]
     assert found.changed[0].after == f"{2.5e-7 * (1 + 1e-14):.17g}"
 
 
@@ -110,7 +110,7 @@ def test_a_case_that_ends_otherwise_or_is_missing_is_a_change(tmp_path):
 
     found = compare(make(tmp_path / "a"), make(tmp_path / "b", edit=edit))
     assert found.only_first == ["IAS15(epsilon=1.0) on kepler()"]
-    assert (found.changed[0].what, found.changed[0].before, found.changed[0].after) == (
+    assert (found.changed[0].quantity, found.changed[0].before, found.changed[0].after) == (
         "outcome",
         "ok",
         "timeout",

@@ -134,8 +134,8 @@ def stays(
     es: Sequence[float] = MAP_ECCENTRICITIES, speeds: Sequence[float] = MAP_SPEEDS, turns: int = MAP_TURNS
 ) -> Array:
     """Return after how many revolutions planetoids have gone far away, (len(es), len(speeds)); NaN: never."""
-    found = [[_every_turn(AXIS, e, (START[0], speed), turns)[1] for speed in speeds] for e in es]
-    return np.array(found, dtype=float)
+    rows = [[_every_turn(AXIS, e, (START[0], speed), turns)[1] for speed in speeds] for e in es]
+    return np.array(rows, dtype=float)
 
 
 def _every_turn(
@@ -143,13 +143,13 @@ def _every_turn(
 ) -> tuple[Array, int | None]:
     """Return the states at the apocentres 1 .. turns, and where the planetoid went far away."""
     stepper = METHOD.compile(system).start(np.array(y0), system.pack({"e": e}), math.pi)
-    made = np.empty((0, len(y0)))
-    while len(made) < turns:
-        ahead = np.arange(len(made) + 1.0, min(len(made) + 50, turns) + 1)
+    states = np.empty((0, len(y0)))
+    while len(states) < turns:
+        ahead = np.arange(len(states) + 1.0, min(len(states) + 50, turns) + 1)
         samples = stepper.advance(math.pi + ahead * PER_TURN * STEP)
-        made = np.vstack([made, samples.y])
-        far = np.flatnonzero(~(np.abs(made[:, 0]) < FAR))
+        states = np.vstack([states, samples.y])
+        far = np.flatnonzero(~(np.abs(states[:, 0]) < FAR))
         if far.size or samples.status.failed:
-            n = int(far[0]) if far.size else len(made)
-            return made[:n], n + 1
-    return made, None
+            n = int(far[0]) if far.size else len(states)
+            return states[:n], n + 1
+    return states, None

@@ -31,8 +31,8 @@ def departure(
         else:
             times = np.linspace(start, ahead, max(2, round((ahead - start) / every) + 1))
             samples = stepper.advance(times[1:])
-        if samples.t.size and (found := first(samples.t, departed(samples.y))) is not None:
-            return found
+        if samples.t.size and (time := first(samples.t, departed(samples.y))) is not None:
+            return time
         if samples.status.failed:
             return stepper.t
         stretch = min(stretch * GROWTH, longest)

@@ -114,15 +114,15 @@ def by_step(family: str, steps: Sequence[float] = STEPS, starts: int = STEP_STAR
 def agreement(method: MethodBase, t_end: float = 100.0) -> float:
     """Return the time of the first step at which the orbit is `AGREES` away from the true one."""
     problem = start(t_end)
-    found = integrate(problem, method, times=[t_end], sample="steps")
-    truth = integrate(problem, TRUTH, times=found.t)
-    return parted(found.t, found.y, truth.y)
+    solution = integrate(problem, method, times=[t_end], sample="steps")
+    truth = integrate(problem, TRUTH, times=solution.t)
+    return parted(solution.t, solution.y, truth.y)
 
 
 def parted(t: Array, y: Array, truth: Array) -> float:
     """Return the first time at which positions are `AGREES` away from the true ones, or else the last."""
-    found = first(t, ~(np.hypot(*(y[:, :2] - truth[:, :2]).T) < AGREES))
-    return float(t[-1]) if found is None else found
+    time = first(t, ~(np.hypot(*(y[:, :2] - truth[:, :2]).T) < AGREES))
+    return float(t[-1]) if time is None else time
 
 
 def escape_map(

@@ -88,8 +88,8 @@ def _on_henon_heiles(method: MethodBase, problem: Problem) -> Found:
 def _on_period_annulus(method: MethodBase, _: Problem) -> Found:
     """Return the edge found over the short span and its error in H."""
     every = None if method.library == "hbvm-bench" else LOOK
-    found = period_annulus.edge(method, period_annulus.SHORT_SPAN, every=every)
-    return {"c": found.c, "error": period_annulus.error_of(found.c)}, ""
+    edge = period_annulus.edge(method, period_annulus.SHORT_SPAN, every=every)
+    return {"c": edge.c, "error": period_annulus.error_of(edge.c)}, ""
 
 
 def _ended(solution: Solution) -> str:

@@ -50,14 +50,14 @@ def orders() -> list[Order]:
         return integrate(problem, method, times=[ORDER_SPAN]).y[0]
 
     truth = end(HBVM(k=20, s=10, h=0.05))
-    made = []
+    orders_ = []
     for s in DEGREES:
         h = ORDER_SPAN / np.unique(np.geomspace(*ORDER_STEPS[s], 5).round().astype(int))
         for k in sorted({s, s + 1, 2 * s, 3 * s}):
             errors = [float(np.abs(end(HBVM(k=k, s=s, h=step)) - truth).max()) for step in h]
             slope = float(np.polyfit(np.log(h), np.log(errors), 1)[0])
-            made.append(Order(s, k, h.tolist(), errors, slope))
-    return made
+            orders_.append(Order(s, k, h.tolist(), errors, slope))
+    return orders_
 
 
 def reversals(t_end: float = 100.0) -> list[tuple[str, float]]:
@@ -93,14 +93,14 @@ def collocation_gap() -> float:
     """Return the largest difference of the HBVM(s, s) tableau from the paper's a_ij = int_0^{c_i} l_j."""
     worst = 0.0
     for s in range(1, 9):
-        made = tableau(s, s)
+        method = tableau(s, s)
         x, w = leggauss(s)
         for i in range(s):
-            u = made.c[i] * (1 + x) / 2
+            u = method.c[i] * (1 + x) / 2
             for j in range(s):
-                others = np.delete(made.c, j)
-                lagrange = np.prod((u[:, None] - others) / (made.c[j] - others), axis=1)
-                worst = max(worst, abs(made.c[i] * (w @ lagrange) / 2 - made.A[i, j]))
+                others = np.delete(method.c, j)
+                lagrange = np.prod((u[:, None] - others) / (method.c[j] - others), axis=1)
+                worst = max(worst, abs(method.c[i] * (w @ lagrange) / 2 - method.A[i, j]))
     return worst
 
 

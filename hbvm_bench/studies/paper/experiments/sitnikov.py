@@ -126,12 +126,12 @@ def orbits() -> dict[str, Orbit]:
 
     Where a method is installed that keeps both energy and angular momentum, ``both`` is its run.
     """
-    made = {"gauss": orbit(GAUSS), "hbvm": orbit(HBVM_18), "fine": orbit(TRUTH)}
-    made["truth"] = orbit(TRUTH, every=4)
+    orbits_ = {"gauss": orbit(GAUSS), "hbvm": orbit(HBVM_18), "fine": orbit(TRUTH)}
+    orbits_["truth"] = orbit(TRUTH, every=4)
     if "LineIntegral" in registry.names():
         laws = ["energy", "angular_momentum"]
-        made["both"] = orbit(registry.create("LineIntegral", k=24, s=4, h=H, invariants=laws))
-    return made
+        orbits_["both"] = orbit(registry.create("LineIntegral", k=24, s=4, h=H, invariants=laws))
+    return orbits_
 
 
 def ellipses() -> list[Array]:
@@ -147,8 +147,13 @@ def neighbours() -> list[float | None]:
     starts = [problem(E + i * 2.0**-53) for i in range(NEIGHBOURS)]
     program = GAUSS.compile(starts[0].system)
     return [
-        departure(program.start(one.y0, one.par), T_END, lambda y: np.abs(y[:, 8]) > LOST, stretch=64 * H)
-        for one in starts
+        departure(
+            program.start(neighbour.y0, neighbour.par),
+            T_END,
+            lambda y: np.abs(y[:, 8]) > LOST,
+            stretch=64 * H,
+        )
+        for neighbour in starts
     ]
 
 

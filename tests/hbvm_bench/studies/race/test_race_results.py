@@ -27,14 +27,14 @@ REPORTS = Path(__file__).parents[4] / "reports"
 
 def test_a_stored_race_is_read_back_equal(race, tmp_path):
     save(race, tmp_path)
-    (found,) = results.of(gather(opened([tmp_path])))
+    (found,) = results.races_of(gather(opened([tmp_path])))
     assert (found.entry, found.run, found.records) == (race.entry, race.run, race.records)
     assert [p.name for p in tmp_path.iterdir()] == [archive.NAME]  # no temporary file is left
 
 
 def test_compile_times_that_are_none_are_refused(race):
     with pytest.raises(InputError, match="compile times of the race are damaged"):
-        results.of(results_of(race.run, beside={"compile_times": {"contest": 1}}))
+        results.races_of(results_of(race.run, beside={"compile_times": {"contest": 1}}))
 
 
 def test_the_json_has_ratios_goals_and_all_samples(race):
@@ -162,7 +162,7 @@ def test_a_quick_run_has_the_best_known_setting_of_every_family():
             short = msgspec.structs.replace(chosen(results.declared(), [race.key]), quick=True)
             there = {resolve(case).case.method for case in short.cases()}
             within = dict(zip(results.ERRORS, race.asked, strict=True))
-            best = [standings.best(race.of(family), within) for family in race.families]
+            best = [standings.best(race.settings(family), within) for family in race.families]
             assert {one.case.method for one in best if one is not None} <= there
 
 
@@ -182,6 +182,6 @@ def test_families_are_compared_by_as_many_settings_each():
 
 
 def test_the_table_of_the_readme_is_that_of_the_stored_results():
-    races = results.of(gather(opened([REPORTS / "race"])))
+    races = results.races_of(gather(opened([REPORTS / "race"])))
     table = printed(replace(tables.overview(races), title="", note=""))
     assert table in (REPORTS.parent / "README.md").read_text(encoding="utf-8"), table

@@ -22,7 +22,7 @@ def test_the_quick_race_runs_and_prints_json(tmp_path, capsys):
     assert [race["problem"] for race in data["races"]] == ["kepler"]
     assert {ratio["peer"] for ratio in data["ratios"]} == {"Taylor", "IAS15", "Leapfrog", "DOP853"}
     assert {path.name for path in tmp_path.iterdir()} == {*("campaign.json", "cases", "readings", "report")}
-    (race,) = results.of(gather([Store(tmp_path)]))
+    (race,) = results.races_of(gather([Store(tmp_path)]))
     ours, taylor = race.best("", 1e-13, 1e-10), race.best("Taylor", 1e-13, 1e-10)
     for record, energy, position in ((ours, 1e-13, 1e-10), (taylor, 1e-13, 1e-11)):
         assert record.result.metrics["energy_max"].value < energy  # measured 7e-15 and 3e-15
@@ -97,6 +97,6 @@ def test_a_race_that_was_killed_goes_on_where_it_was(tmp_path, capsys):
     assert "21, 21 already there" in capsys.readouterr().err
     after = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "cases").glob("*.npz")}
     assert after == measured
-    (race,) = results.of(gather([Store(tmp_path)]))
+    (race,) = results.races_of(gather([Store(tmp_path)]))
     assert {one.timing.process for one in race.records if one.timing} != {""}
     assert all(len(one.timing.rounds) == 2 for one in race.records if one.timing and one.timing.rounds)
