@@ -52,7 +52,8 @@ def test_a_case_has_a_process_that_begins_with_nothing_and_its_limits_hold(tmp_p
     store = Store(tmp_path)
     store.prepare()
     asked = Case(problem=SHORT, method=method, grid=Grid(count=4))
-    record = run_case(asked, str(store.directory), Limits(wall_seconds=2, memory_gib=0.6))
+    seconds = 2 if outcome == "timeout" else 60  # the others end earlier, on a busy machine too
+    record = run_case(asked, str(store.directory), Limits(wall_seconds=seconds, memory_gib=0.6))
     assert (record.result.outcome, record.result.reason) == (outcome, reason)
     assert (
         0.02 < record.peak_memory_gib < 1.2
