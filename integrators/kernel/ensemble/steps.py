@@ -18,7 +18,7 @@ from llvmlite import ir
 from integrators.kernel.ensemble.control import Control
 from integrators.kernel.ensemble.group import Group
 from integrators.kernel.ensemble.writer import Index, Writer
-from integrators.kernel.native import binary, field, store
+from integrators.kernel.native import binary, field, machine, store
 from integrators.kernel.simd.emit import DOUBLE, INTEGER, splat, text_of
 from integrators.kernel.simd.operations import where
 from integrators.kernel.simd.values import Value
@@ -33,6 +33,7 @@ from problems.systems.base import System
 
 INFINITY = float("inf")
 UNROLLED = 640  # products of a sweep up to which stages and rows are written out
+ABREAST = 2  # rows of a product side by side: their sums stay in registers, and share its matrix
 AGAIN = 40  # sweeps after which a start that was extrapolated is given up for one without values
 MOST = 80  # sweeps after which a trajectory leaves
 
@@ -137,14 +138,15 @@ class Steps(Writer):
             setattr(self, name, self.array(slots[name]))
         for name in ("factor", "moved", "strict", "floored", "size", "stage", "found"):
             setattr(self, name, self.room(slots[name], rows))
-        self.values = self.room(slots["values"], k * rows)
+        self.held = self.unrolled and machine.many_registers()
+        self.values = self.room(slots["values"], k * rows) if self.held else self.array(slots["values"])
         self.ahead = self.array(slots["ahead"]) if form.varying else self.room(slots["ahead"], k * rows)
         self.base = self.array(slots["base"])
         kept = self.array(slots["values"])
         pointer = DOUBLE.as_pointer()
         self.result, self.exception = b.alloca(pointer), b.alloca(pointer)
         self.h = self.get(self.array(slots["h"]))
-        if self.unrolled:
+        if self.held:
             self.each(k * rows, lambda i: self.put(self.get(kept, i), self.values, i))
         alive = self.get(self.array(slots["alive"]))
         self.alive = self.variable(self.bits, alive.compare("!=", 0.0))
@@ -162,7 +164,7 @@ class Steps(Writer):
         living = self.any(b.load(self.alive))
         b.cbranch(b.and_(living, b.icmp_signed("<", steps, count)), loop, end)
         b.position_at_end(end)
-        if self.unrolled:
+        if self.held:
             self.each(k * rows, lambda i: self.put(self.get(self.values, i), kept, i))
         self.put(self.one.where(b.load(self.alive), 0.0), self.array(slots["alive"]))
         for variable, name in ((self.sweeps, "sweeps"), (self.rate, "rate")):
@@ -266,22 +268,40 @@ class Steps(Writer):
 
             self.each(blocks, invert)
 
-    def combination(self, table: Any, i: Index) -> Callable[..., Value]:
-        """Return what makes ``sum_j table[i, j] values[j, d]`` for rows d, added to a start."""
+    def combination(
+        self, table: Any, i: Index, values: Any, known: dict[Index, Value] | None = None
+    ) -> Callable[..., list[Value]]:
+        """Return what makes ``sum_j table[i, j] values[j, d]`` for rows d, each added to a start.
+
+        Values that are ``known`` by their place are not loaded.
+        """
         k, rows = self.form.k, self.form.rows
         factors = [self.number(table, self.at(i, k, j)) for j in range(k)]
 
         # The newest value comes last: all the rest need not wait for it.
         order = [*range(i, k), *range(i)] if isinstance(i, int) else [*range(k)]
 
-        def total(d: Index, start: Value | None = None) -> Value:
+        def totals(some: list[Index], starts: list[Value] | None = None) -> list[Value]:
             for j in order:
-                value = self.get(self.values, self.at(j, rows, d))
-                start = factors[j] * value if start is None else factors[j].fma(value, start)
-            assert start is not None
-            return start
+                places = [self.at(j, rows, d) for d in some]
+                factor = factors[j]
+                found = [known[p] if known and p in known else self.get(values, p) for p in places]
+                if starts is None:
+                    starts = [factor * value for value in found]
+                else:
+                    starts = [factor.fma(value, start) for value, start in zip(found, starts, strict=True)]
+            assert starts is not None
+            return starts
 
-        return total
+        return totals
+
+    def few_rows(self, body: Callable[[list[Index]], None]) -> None:
+        """Write ``body`` for `ABREAST` components of a stage at a time."""
+        if not self.unrolled:
+            self.each_row(lambda d: body([d]))
+            return
+        for first in range(0, self.form.rows, ABREAST):
+            body([*range(first, min(first + ABREAST, self.form.rows))])
 
     def predict(self) -> None:
         """First values: the last step's polynomial at the nodes of this one."""
@@ -292,8 +312,13 @@ class Steps(Writer):
         table = self.table(Group.slots["extrapolation"])
 
         def one(i: Index) -> None:
-            total = self.combination(table, i)
-            self.each_row(lambda d: self.put(total(d), self.ahead, self.at(i, rows, d)))
+            totals = self.combination(table, i, self.values)
+
+            def ahead(some: list[Index]) -> None:
+                for d, total in zip(some, totals(some), strict=True):
+                    self.put(total, self.ahead, self.at(i, rows, d))
+
+            self.few_rows(ahead)
 
         self.each(k, one)
         self.each(k * rows, lambda i: self.put(self.get(self.ahead, i), self.values, i))
@@ -342,25 +367,36 @@ class Steps(Writer):
         k, rows = form.k, form.rows
         active = b.load(self.active)
         matrix = self.table(Group.slots["matrix"])
+        newest: dict[Index, Value] = {}  # of the stage before, which is waited for
         self.each_row(lambda d: self.put(self.zero, self.moved, d))
 
         def stage(i: Index) -> None:
-            total = self.combination(matrix, i)
+            # Its address is loaded anew for each stage of few: the compiler would keep all values, of which
+            # registers hold a few, and spend as much on moving them as on the products.
+            values = self.values if self.held or not self.unrolled else self.table(Group.slots["values"])
+            totals = self.combination(matrix, i, values, dict(newest))
+            newest.clear()
 
-            def displace(d: Index) -> None:
-                base = self.get(self.base, self.at(i, rows, d))
-                moved = total(d, base) if form.unit else self.get(self.factor, d).fma(total(d), base)
-                self.put(self.get(self.state, d) + moved, self.stage, d)
+            def displace(some: list[Index]) -> None:
+                bases = [self.get(self.base, self.at(i, rows, d)) for d in some]
+                for d, total, base in zip(
+                    some, totals(some, bases if form.unit else None), bases, strict=True
+                ):
+                    moved = total if form.unit else self.get(self.factor, d).fma(total, base)
+                    self.put(self.get(self.state, d) + moved, self.stage, d)
 
-            self.each_row(displace)
+            self.few_rows(displace)
             time = self.t + self.number(self.nodes, i).fma(self.h, self.t_low)
             b.call(self.field, [self.result, self.exception, time.value, self.stage, self.par, self.found])
 
             def keep(d: Index) -> None:
                 place = self.at(i, rows, d)
-                old, new = self.get(self.values, place), self.get(self.found, d)
+                old, new = self.get(values, place), self.get(self.found, d)
                 self.put(self.get(self.moved, d).larger((new - old).absolute()), self.moved, d)
-                self.put(new.where(active, old), self.values, place)
+                kept = new.where(active, old)
+                self.put(kept, values, place)
+                if self.unrolled:
+                    newest[place] = kept
 
             self.each_row(keep)
 
