@@ -148,14 +148,16 @@ def width_for(system: System, second: bool, rows: int, varying: bool) -> int:
     Eight, which fill a register where there are 32 of eight doubles; more where the field has few components
     and the results of divisions, roots or other functions are waited for (Kepler: 15 % faster with
     sixteen, an exponential of one component twice as fast with 32). Adaptive steps wait for those
-    of their control (Henon and Heiles: 8 % faster with sixteen). With fewer registers adaptive steps of few
-    components go eight by eight: a value fills two registers of AVX2 then (Henon and Heiles 18 %, Kepler 9 %
-    and Morse 7 % faster than with sixteen, sixteen and 32; with four 18 % to 57 % slower than with eight).
+    of their control (Henon and Heiles: 8 % faster with sixteen). With 16 registers of AVX2 eight fill two
+    of them, and sixteen are faster only where one component waits for a function (Morse: 9 % with
+    adaptive and 15 % with fixed steps; a pendulum's sine: within 3 %). Kepler is 14 % slower with fixed and
+    6 % with adaptive steps, the double pendulum 36 %.
     """
-    if varying and not machine.many_registers():
-        return LANES
     nodes = reachable(system.function("force" if second else "field").roots)
-    if rows > 4 or (not varying and all(node.op in SOON for node in nodes)):
+    waits = any(node.op not in SOON for node in nodes)
+    if not machine.many_registers():
+        return 2 * LANES if rows == 1 and waits else LANES
+    if rows > 4 or not (varying or waits):
         return LANES
     return 4 * LANES if rows == 1 else 2 * LANES
 
