@@ -59,8 +59,6 @@ by `offers`; without it the method still integrates. The conformance kit checks 
     the samples of such a `LowParts` stepper leave out is its ``low``.
 20. `AsHBVM`: ``as_hbvm`` of a method returns the HBVM(k, s) that it is; `integrators.order_of` and the
     plugins then know its coefficients.
-21. `Reusable`: `integrate` lets a stepper ``release`` its memory when it needs it no more, and the next start
-    takes it.
 """
 
 import inspect
@@ -98,7 +96,6 @@ __all__ = [
     "PieceSize",
     "PreparedBatches",
     "Program",
-    "Reusable",
     "Samples",
     "Samplings",
     "Stats",
@@ -424,14 +421,6 @@ class Checkpoints(Protocol):
         ...
 
 
-class Reusable(Protocol):
-    """A stepper whose memory serves the next trajectory of its program."""
-
-    def release(self) -> None:
-        """Leave the memory to a stepper that is started later; nothing of this one is called any more."""
-        ...
-
-
 class Interruptible(Protocol):
     """A stepper that another thread can call back.
 
@@ -677,7 +666,7 @@ class AsHBVM(Protocol):
 CAPABILITIES: tuple[type, ...] = (
     Samplings, Destination, KeptError, Checkpoints, Interruptible, EventStepper,
     Events, Actions, Batches, PreparedBatches, Threads, PieceSize, TimeLimit, Variations, Gradients,
-    DoubleDouble, LowParts, AsHBVM, Reusable,
+    DoubleDouble, LowParts, AsHBVM,
 )  # fmt: skip
 """All of them."""
 

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -560,6 +560,17 @@ def read_file(path: Any, problem: Any, readers: Mapping[str | None, Any]) -> Any
             f"{shown(str(path))} is not a solution, or is damaged ({why}); "
             "give a file that Solution.save wrote."
         ) from None
+
+
+if TYPE_CHECKING:
+    made = Solution
+else:
+
+    def made(**fields: Any) -> Solution:
+        """Return ``Solution(**fields)``, given all of them; a frozen class sets each by a call."""
+        solution = object.__new__(Solution)
+        vars(solution).update(fields)
+        return solution
 
 
 def from_file(words: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]], problem: Problem) -> Solution:

@@ -353,12 +353,13 @@ class Arguments:
     ) -> tuple[Sequence[Any], Mapping[str, Any]]:
         """Return what a call gives by place and by name, checked as by `bind`; Python knows the defaults."""
         self.check_names(values, options)
-        free = self._free
-        placed = [
-            value if key in free else self._used(key, value)
-            for key, value in zip(self._by_place, values, strict=False)
-        ]
-        named = {key: value if key in free else self._used(key, value) for key, value in options.items()}
+        free, placed, named = self._free, list(values), dict(options)
+        for place, key in enumerate(self._by_place[: len(placed)]):
+            if key not in free:
+                placed[place] = self._used(key, placed[place])
+        for key in options:
+            if key not in free:
+                named[key] = self._used(key, named[key])
         for key, value in self._converted.items():
             if key not in options and key not in self._by_place[: len(values)]:
                 named[key] = value

@@ -532,8 +532,9 @@ class AdaptiveProgram(HBVMProgram):
         """Set the longest steps of a trajectory over an interval of a certain length; 0: unknown."""
         most = math.inf if self.max_step is None else self.max_step
         part = LONGEST * interval if interval > 0.0 else math.inf
-        context.controller.longest_blind = min(most, part)
-        context.controller.longest = context.controller.longest_blind if self._timed else most
+        controller = context.controller.numbers
+        controller.longest_blind = min(most, part)
+        controller.longest = controller.longest_blind if self._timed else most
 
     def breakpoints(self, par: Array) -> Array:
         """Return the times that steps end at, ascending: those given, and those of the formulas."""

@@ -25,6 +25,7 @@ class Pair:
 
     def __init__(self, own: Context, partial: Context):
         self.own, self.partial = own, partial
+        self.small = own.nbytes <= BYTES
 
     def keep(self, par: bytes) -> None:
         """Take what both hold for what a trajectory with these parameters begins with."""
@@ -44,6 +45,7 @@ class Spare:
 
     def __init__(self) -> None:
         self._pairs: list[Pair] = []
+        self._most = PAIRS  # which is there still when Python ends and forgets a module's names
 
     def take(self) -> Pair | None:
         """Return a pair that is nobody else's."""
@@ -54,5 +56,5 @@ class Spare:
 
     def give(self, pair: Pair) -> None:
         """Take the pair of a trajectory that is over."""
-        if pair.own.nbytes <= BYTES and len(self._pairs) < PAIRS:
+        if pair.small and len(self._pairs) < self._most:
             self._pairs.append(pair)

@@ -151,6 +151,7 @@ class HBVMStepper(ABC):
     variations: Array | None = None
     """Tangent vectors at the last samples, shape (m, dim, n); see `follow`."""
     _vectors: Vectors | None = None
+    _pair: Pair | None = None
     _recorded = False  # whether steps are recorded for an adjoint
     stop: threading.Event | None = None  # set by another thread: come back, what is made is not wanted
 
@@ -160,12 +161,17 @@ class HBVMStepper(ABC):
         self._implicit: tuple[Workspace, Workspace] | None = None
         self._dim, self._pace = y.size, Pace(CHUNK, y.size)
         self._status, self._reason = Status.RUNNING, ""
-        self._pair: Pair | None = program.pair(par)
-        self._context, self._partial = self._pair.own, self._pair.partial
-        program.begin(self._pair, y, par, t0)
+        self._pair = pair = program.pair(par)
+        self._context, self._partial = pair.own, pair.partial
+        program.begin(pair, y, par, t0)
         if program.solver.strategy == ALWAYS_IMPLICIT:
             self._take_implicit()
         self._begin(y, t0)
+
+    def __del__(self) -> None:
+        # A search for events, vectors and records know the memory too, and may be there longer.
+        if self._pair and self.search is None and self._vectors is None and not self._recorded:
+            self._program.spare.give(self._pair)
 
     def look_for(
         self, events: Mapping[str, Event], functions: Sequence[EventFunction], actions: Mapping[str, Action],
@@ -251,14 +257,6 @@ class HBVMStepper(ABC):
             workspace.forget()
         steps(engine.RESET, ctx.address, 0, 0, 0, 0, 0, 0, 0, address(y), 0)
 
-    @one_thread
-    def release(self) -> None:
-        """Leave its memory to the next trajectory; see `integrators.protocol.Reusable`."""
-        pair, self._pair = self._pair, None
-        if pair is not None and self.search is None and self._vectors is None and not self._recorded:
-            del self._context, self._partial
-            self._program.spare.give(pair)
-
     @property
     def t(self) -> float:
         """Time of the last step."""
@@ -298,21 +296,17 @@ class HBVMStepper(ABC):
         length at which it was found, or the time and 0 where a step ends on a switching surface, of the first
         64 places. With variations ``"variations"``, a dict: their iterations.
         """
-        ctx = self._context
+        counters = self._context.counters.numbers
         return Stats(
-            steps=ctx.counters.steps,
-            rejections=ctx.counters.rejections,
-            evaluations=ctx.counters.evaluations,
-            iterations=ctx.counters.iterations,
-            solver=self._solvers(),
-            extra=self._extra(),
-        )
+            counters.steps, counters.rejections, counters.evaluations, counters.iterations, self._solvers(),
+            self._extra(),
+        )  # fmt: skip
 
     def _extra(self) -> dict[str, Any]:
-        ctx, kept = self._context, self._program.kept
+        ctx, kept, counters = self._context, self._program.kept, self._context.counters.numbers
         extra: dict[str, Any] = {
-            "partial_steps": ctx.counters.partial_steps,
-            "restarts": ctx.counters.restarts,
+            "partial_steps": counters.partial_steps,
+            "restarts": counters.restarts,
             "lanes": self._program.lanes,
             "form": "second" if self._program.second else "first",
         }
@@ -320,8 +314,8 @@ class HBVMStepper(ABC):
             extra.update(kept.report(ctx))
         if self._implicit is not None:
             extra["implicit"] = {
-                "steps": ctx.counters.implicit_steps,
-                "switches": ctx.counters.switches,
+                "steps": counters.implicit_steps,
+                "switches": counters.switches,
                 **report(*self._implicit),
             }
         if self._vectors is not None:
@@ -337,9 +331,9 @@ class HBVMStepper(ABC):
 
     def _solvers(self) -> str:
         """Return the names of the solvers that have solved steps, the one that solved more first."""
-        ctx = self._context
         if self._implicit is None:
             return "fixed point"
+        ctx = self._context
         implicit = ctx.counters.implicit_steps
         fixed = int(ctx.counters.steps + ctx.solved) - implicit
         always = self._program.solver.strategy == ALWAYS_IMPLICIT

@@ -140,10 +140,11 @@ class AdaptiveStepper(HBVMStepper):
         ctx = self._context
         if abs(end) < sys.float_info.max:
             self._goal = end if self.destination is None else self.destination
-            ctx.controller.interval = max(
-                ctx.controller.interval, abs(self._goal - self._origin), abs(end - self._origin)
+            controller = ctx.controller.numbers
+            controller.interval = max(
+                controller.interval, abs(self._goal - self._origin), abs(end - self._origin)
             )
-            self._program.limit(ctx, ctx.controller.interval)
+            self._program.limit(ctx, controller.interval)
         way = end - self.t
         if way == 0.0 or not math.copysign(1.0, way) * ctx.controller.next_length < 0.0:
             return

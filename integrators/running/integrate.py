@@ -24,7 +24,6 @@ from integrators.protocol import (
     KeptError,
     MethodBase,
     Program,
-    Reusable,
     Samples,
     Samplings,
     Status,
@@ -39,6 +38,7 @@ from integrators.running.digits import check_digits, pairs
 from integrators.running.variations import follow
 from integrators.running.watch import SOON, Bar, Report, Watch, both, identity, read
 from integrators.solution import Solution
+from integrators.solution import made as solution_of
 from problems import limits
 from problems.checks import File, Must, Word, checked_arguments
 from problems.errors import InputError, shown
@@ -256,10 +256,11 @@ def integrate(
         stats.extra = {**stats.extra, "losses": lost}
     if sample == "dense":  # the polynomials conserve nothing
         stats.extra = {**stats.extra, "sample": sample}
-    reached = np.concatenate(t)
-    solution = Solution(
+    reached = _joined(t)
+    solution = solution_of(
         t=reached,
-        y=np.concatenate(y),
+        y=_joined(y),
+        events={},
         variations=None if vectors is None else np.concatenate(vectors),
         directions=directions,
         low=None if lows is None else np.concatenate(lows),
@@ -274,10 +275,7 @@ def integrate(
         method=method,
         error=error,
     )
-    solution = _with_events(solution, stepper.search) if wanted else solution
-    if offers(stepper, Reusable):
-        stepper.release()
-    return solution
+    return _with_events(solution, stepper.search) if wanted else solution
 
 
 def _lost(problem: Problem, method: MethodBase, samples: Samples, steps: int) -> Losses:
@@ -355,6 +353,11 @@ def _next_piece(
         return np.array([goal]), "steps", 0
     count = max(count, 1)
     return grid[made : made + count], sample, count
+
+
+def _joined(parts: list[Array]) -> Array:
+    """Return the pieces as one array of its own."""
+    return parts[1].copy() if len(parts) == 2 and not len(parts[0]) else np.concatenate(parts)
 
 
 def _growth(seconds: float) -> float:

@@ -27,7 +27,6 @@ from integrators.testing.capabilities import (
     keeps_the_error_of_a_user_s_function,
     pairs_hold_twice_the_digits,
     prepared_batches_are_batches,
-    released_memory_serves_another,
     samplings_are_as_stated,
     tangents_follow_and_change_nothing,
     the_size_of_a_piece_is_a_count,
@@ -105,7 +104,6 @@ CHECKS: tuple[Check, ...] = (
     adjoints_are_what_tangents_say,
     pairs_hold_twice_the_digits,
     is_the_hbvm_that_it_names,
-    released_memory_serves_another,
 )
 
 

@@ -26,7 +26,6 @@ from integrators.protocol import (
     MethodBase,
     PieceSize,
     PreparedBatches,
-    Reusable,
     Samplings,
     Status,
     Threads,
@@ -205,27 +204,6 @@ def comes_back_after_its_time(method: MethodBase, problem: Problem) -> str | Non
     return None
 
 
-def released_memory_serves_another(method: MethodBase, problem: Problem) -> str | None:
-    """Check that what is released is no part of samples, and that the next trajectory has its own bits."""
-    program, grid = method.compile(problem.system), regular(problem, 9)
-    first: Any = program.start(problem.y0, problem.par, problem.t0)
-    if not offers(first, Reusable):
-        return "its memory serves it alone"
-    made = first.advance(grid)
-    kept = made.t.copy(), made.y.copy()
-    first.release()
-    for shift in (1.001, 1.0):
-        begin = shift * problem.y0, problem.par, problem.t0
-        steppers: list[Any] = [each.start(*begin) for each in (method.compile(problem.system), program)]
-        alone, again = steppers
-        plain, found = alone.advance(grid), again.advance(grid)
-        require(np.array_equal(plain.y, found.y), "the next trajectory has its own bits")
-        require(alone.stats == again.stats, "the next trajectory has its own counters")
-        again.release()
-    require(all(map(np.array_equal, (made.t, made.y), kept)), "samples are nobody else's")
-    return None
-
-
 def tangents_follow_and_change_nothing(method: MethodBase, problem: Problem) -> str | None:
     """Check that tangent vectors leave the trajectory's bits alone, and are derivatives of its end."""
     stepper = start(method, problem)
@@ -386,7 +364,6 @@ CHECK_OF: dict[type, Callable[[MethodBase, Problem], str | None]] = {
     DoubleDouble: pairs_hold_twice_the_digits,
     LowParts: pairs_hold_twice_the_digits,
     AsHBVM: is_the_hbvm_that_it_names,
-    Reusable: released_memory_serves_another,
 }
 """Which check a capability has."""
 

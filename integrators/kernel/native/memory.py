@@ -324,12 +324,15 @@ class Memory(_Slots):
 
     def content(self) -> "Content":
         """Return a copy of all that it holds, for `renew`."""
+        self._moved = False
         return self._memory.copy(), self._pointed.copy()
 
     def renew(self, content: "Content") -> None:
         """Take back what `content` returned."""
         self._memory[:], pointed = content
-        self._point_as(pointed)
+        if self._moved:
+            self._point_as(pointed)
+            self._moved = False
 
     def _point_as(self, pointed: Mapping[int, NDArray[Any]]) -> None:
         self._pointed.clear()
@@ -337,6 +340,7 @@ class Memory(_Slots):
 
     def point(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Let slots point to arrays, and keep these alive."""
+        self._moved = True
         for name, array in arrays.items():
             place = self.word_of[name]
             self._pointed[place] = array

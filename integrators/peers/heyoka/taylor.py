@@ -3,7 +3,6 @@
 import copy
 import os
 import warnings
-import weakref
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -217,7 +216,7 @@ class TaylorProgram(ProgramBase):
         except IndexError:  # there was none, or another thread has taken the last one
             integrator = copy.copy(self.template)
         stepper = TaylorStepper(integrator, y, par, t)
-        weakref.finalize(stepper, self._spare.append, integrator).atexit = False
+        stepper.lent = integrator, self._spare
         return stepper
 
 
@@ -256,6 +255,13 @@ class TaylorStepper(RestorableStepper):
     samplings = ("partial", "steps", "stop")
     search: TaylorSearch | None = None
     """What keeps the events, see `look_for`."""
+    lent: tuple[Any, list[Any]] | None = None
+    """The program's integrator that it has, and the list that it comes back to."""
+
+    def __del__(self) -> None:
+        if self.lent:
+            integrator, spare = self.lent
+            spare.append(integrator)
 
     def __init__(self, integrator: Any, y: Array, par: Array, t: float):
         super().__init__(y, t)

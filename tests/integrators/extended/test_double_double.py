@@ -176,7 +176,6 @@ def test_conforms(check):
         testing.events_may_change_the_state,
         testing.batches_are_single_trajectories,
         testing.prepared_batches_are_batches,
-        testing.released_memory_serves_another,
         testing.threads_change_no_bits,
         testing.the_size_of_a_piece_is_a_count,
         testing.comes_back_after_its_time,

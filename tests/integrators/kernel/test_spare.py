@@ -76,14 +76,26 @@ def test_what_was_integrated_before_leaves_no_trace(method, others, last, sample
 
 def test_the_memory_is_the_same_one():
     made = prepared(HBVM(), KEPLER.system)
-    integrate(KEPLER, HBVM(), 1.0)
+    made.spare = spare.Spare()
     first, second = (made.start(KEPLER.y0, KEPLER.par) for _ in range(2))
     place = first._context.address
-    first.release()
-    first.release()  # once is enough
+    del first
     third, fourth = (made.start(KEPLER.y0, KEPLER.par) for _ in range(2))
     assert third._context.address == place
     assert len({place, second._context.address, fourth._context.address}) == 3
+
+
+def test_what_others_know_stays_theirs():
+    made = prepared(HBVM(), KEPLER.system)
+    made.spare = spare.Spare()
+    first = made.start(KEPLER.y0, KEPLER.par)
+    first.follow(np.eye(4), np.zeros((0, 4)))
+    del first
+    records = made.start(KEPLER.y0, KEPLER.par)
+    records.record(records.recorder(8))
+    del records
+    integrate(KEPLER, HBVM(), 1.0, events=lambda t, y: y[1])
+    assert made.spare.take() is None
 
 
 def test_an_implicit_solver_that_came_later_is_not_handed_on():
@@ -95,16 +107,18 @@ def test_an_implicit_solver_that_came_later_is_not_handed_on():
 
 def test_neither_large_memory_nor_much_is_kept(monkeypatch):
     made = prepared(HBVM(), KEPLER.system)
-    made.spare = spare.Spare()
-    steppers = [made.start(KEPLER.y0, KEPLER.par) for _ in range(spare.PAIRS + 2)]
-    size = steppers[0]._context.nbytes
+
+    def kept():
+        made.spare = spare.Spare()
+        steppers = [made.start(KEPLER.y0, KEPLER.par) for _ in range(spare.PAIRS + 2)]
+        del steppers
+        return len([pair for _ in range(spare.PAIRS + 2) if (pair := made.spare.take())])
+
+    size = made.contexts()[0].nbytes
     monkeypatch.setattr(spare, "BYTES", size - 1)
-    steppers.pop().release()
-    assert made.spare.take() is None
+    assert kept() == 0
     monkeypatch.setattr(spare, "BYTES", size)
-    for stepper in steppers:
-        stepper.release()
-    assert len([pair for _ in steppers if (pair := made.spare.take())]) == spare.PAIRS
+    assert kept() == spare.PAIRS
 
 
 def test_two_threads_have_memory_of_their_own():
