@@ -1,4 +1,4 @@
-"""From an error over time to its law: bounded, square root, linear, exponential or a drift.
+"""From an error over time to its law: bounded, a power of t with its interval, exponential or a drift.
 
 Round-off that is unbiased makes the error of a conserved quantity walk at random,
 like t^(1/2) (Brouwer's law); a biased rounding, or a method that does not conserve,
@@ -37,14 +37,11 @@ STEEPEST = 12.0  # powers of t, and e-foldings times 40, that are searched
 
 LAWS: dict[str, str] = {
     "bounded": "stays within a bound",
-    "square root": "grows like t^(1/2)",
-    "linear": "grows like t",
-    "power": "grows like another power of t",
+    "power": "grows like a power of t",
     "exponential": "grows like exp(t)",
     "drift": "drifts: the mean over the starts is not 0",
 }
 CURVES = [law for law in LAWS if law != "drift"]  # that are fitted; a drift is told by the mean
-POWERS = {"bounded": 0.0, "square root": 0.5, "linear": 1.0}  # of t
 
 
 def curve(law: Law, t: ArrayLike) -> Array:
@@ -56,8 +53,8 @@ def curve(law: Law, t: ArrayLike) -> Array:
         growth = math.nan if law.growth is None else law.growth
         grown = np.exp(np.minimum(growth * (times - law.end), 0.0))
     else:
-        slope = math.nan if law.slope is None else law.slope
-        grown = (times / law.end) ** POWERS.get(law.law, slope)
+        slope = 0.0 if law.law == "bounded" else math.nan if law.slope is None else law.slope
+        grown = (times / law.end) ** slope
     return np.hypot(law.floor, law.reached * grown)
 
 
@@ -135,10 +132,8 @@ def mean(t: ArrayLike, errors: ArrayLike) -> Law:
 def fit(t: ArrayLike, errors: ArrayLike, *, signed: bool = True) -> Law:
     """Find the law of an error.
 
-    A law with a name is preferred to an arbitrary power of t, unless the interval of
-    the power excludes both 1/2 and 1. Signed errors that grow by a power of t, whatever
-    it is, are called a drift where the mean over the starts is one (`drifts`). Samples that
-    are not finite end the series; fewer than two leave no law.
+    Signed errors that grow by a power of t are called a drift where the mean over the starts is
+    one (`drifts`). Samples that are not finite end the series; fewer than two leave no law.
 
     Parameters
     ----------
@@ -183,11 +178,10 @@ def fit(t: ArrayLike, errors: ArrayLike, *, signed: bool = True) -> Law:
         return replace(found, why=why, floor=float(values[kept].min()))
     fits = {law: _fitted(law, middle[kept], values[kept]) for law in CURVES}
     slope, low, high = _slope(times, rows, fits["power"])
-    named = [name for name in CURVES if name != "power" or not any(low <= a <= high for a in (0.5, 1.0))]
-    law = min(named, key=lambda name: fits[name].score)
+    law = min(CURVES, key=lambda name: fits[name].score)
     if fits[law].score > fits["bounded"].score - EVIDENCE or fits[law].above < FEWEST_ABOVE:
         law = "bounded"
-    if drifts(found) and law in ("square root", "linear", "power"):
+    if drifts(found) and law == "power":
         fits["drift"], law = fits["power"], "drift"
     floor = math.exp(fits[law].parameters[0])
     return replace(
@@ -222,7 +216,7 @@ def _fitted(law: str, t: Array, values: Array) -> _Fit:
     over = t / t[-1] - 1.0 if law == "exponential" else np.log(t / t[-1])
 
     def grown(p: Array) -> Array:  # ln g(t); at the end of the span it is p[1]
-        return p[1] + POWERS.get(law, p[-1]) * over
+        return p[1] + p[2] * over
 
     def residual(p: Array) -> Array:
         return 0.5 * np.logaddexp(2.0 * p[0], 2.0 * grown(p)) - logs
@@ -230,10 +224,9 @@ def _fitted(law: str, t: Array, values: Array) -> _Fit:
     # The floor lies not far below the least value: below that it has no effect and no meaning.
     bounds = [(low - 3.0, high + 1e-9), (low - 3.0, high + 3.0)]
     guesses = [[low - 1.0, float(logs[-1])], [low, float(logs[-1])]]
-    if law in ("power", "exponential"):
-        bounds.append((0.0, STEEPEST) if law == "power" else (0.0, 40.0 * STEEPEST))
-        steep = (0.5, 1.5) if law == "power" else (2.0, 20.0)
-        guesses = [[*guess, value] for guess in guesses for value in steep]
+    bounds.append((0.0, STEEPEST) if law == "power" else (0.0, 40.0 * STEEPEST))
+    steep = (0.5, 1.5) if law == "power" else (2.0, 20.0)
+    guesses = [[*guess, value] for guess in guesses for value in steep]
     lower, upper = (np.array(side) for side in zip(*bounds, strict=True))
     found = min(
         (least_squares(residual, np.clip(g, lower, upper), bounds=(lower, upper)) for g in guesses),

@@ -23,7 +23,7 @@ from hbvm_bench.store.records import Law
 from hbvm_bench.summaries import outcomes, standings
 from hbvm_bench.summaries.goals import Verdict, verdicts
 from hbvm_bench.summaries.goals import table as goals_table
-from hbvm_bench.summaries.laws import SHORT, power_of
+from hbvm_bench.summaries.laws import clear, power_of, text
 from hbvm_bench.summaries.points import number
 from hbvm_bench.summaries.rows import seconds
 from hbvm_bench.summaries.table import NONE, Table
@@ -153,7 +153,9 @@ def lines(result: Endurance) -> list[Line]:
                 starts=len(errors),
                 failed=max(result.starts, 1) - len(errors),
                 rms=dict(zip(years, rms, strict=False)),
-                drift=record.result.laws.get("energy") if errors.size else None,
+                drift=clear(record.result.laws["energy"])
+                if errors.size and "energy" in record.result.laws
+                else None,
                 seconds=number(record, standings.TIME),
                 times_ours=ratio.median if ratio else None,
             )
@@ -276,7 +278,7 @@ def tables(result: Endurance) -> list[Table]:
 def _named(law: Law) -> str:
     if law.law is None:
         return law.why
-    return "grows" if SHORT[law.law] == "t^a" else drift.LAWS[law.law]
+    return "grows" if law.law == "power" else drift.LAWS[law.law]
 
 
 def _mean(law: Law) -> str:
@@ -327,7 +329,7 @@ def over_time(result: Endurance, look: Mapping[str, Look]) -> Picture | None:
         law = line_of[method].drift
         if law is not None and law.law is not None:
             at = np.geomspace(t[-1] / FALLS_ON, t[-1], LAW_POINTS)
-            traces.append(Trace(number, method, at, drift.curve(law, at), "law", drift.LAWS[law.law]))
+            traces.append(Trace(number, method, at, drift.curve(law, at), "law", text(law)))
     guide = t[t >= t[-1] / 1e3]
     axes.plot(guide, 10.0 ** (low + 0.4) * np.sqrt(guide / guide[0]), color=MUTED, linewidth=0.8)
     axes.annotate(" √t", (guide[-1], 10.0 ** (low + 0.4) * math.sqrt(guide[-1] / guide[0])), color=MUTED)

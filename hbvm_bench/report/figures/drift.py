@@ -1,4 +1,4 @@
-"""The drift of the energy: its error over the starts, and the law that was fitted to it."""
+"""The drift of the energy: its error over the starts, and the law that was fitted to it where it is clear."""
 
 from collections.abc import Sequence
 
@@ -10,14 +10,13 @@ from hbvm_bench.report.figures.canvas import Picture, log_axis, picture, power_r
 from hbvm_bench.report.figures.over_time import Drawn, family_panels, panel_legend, trace
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
 from hbvm_bench.store.records import Law
-from hbvm_bench.summaries.laws import text
+from hbvm_bench.summaries.laws import FEWEST_STARTS, NOT_CLEAR, clear, text
 from hbvm_bench.summaries.rows import reached
 
 Array = NDArray[np.float64]
 
 PER_DECADE = 6  # windows of time in which the error is drawn
 LAW_POINTS = 40
-EARLIEST = 30  # without laws in the store, one is fitted from this part of the span on
 MOST_CASES = 60
 POWERS = (-18, 3)  # an error beyond is no drift but a failure, and is in the table
 
@@ -31,7 +30,7 @@ def drift_figure(cases: Sequence[Drawn]) -> Picture | None:
     if not shown:
         return None
     laws = {key: law for key, (_, _, law) in drifts.items()}
-    said = {key: text(law) for key, law in laws.items()}
+    said = {key: text(law) for key, law in laws.items() if law.law is not None}
     curves = {key: _windows(t, rows) for key, (t, rows, _) in drifts.items()}
     label = "energy error, rms"
     notes = {key: words.replace(" to ", "–") for key, words in said.items()}
@@ -50,27 +49,30 @@ def drift_figure(cases: Sequence[Drawn]) -> Picture | None:
             at, fitted = _law(laws[key], t)
             axes.plot(t, error, look.marker, color=look.light, markersize=2.4, linestyle="")
             axes.plot(at, fitted, color=look.light, linewidth=1.1, dashes=look.dash)
-            traces += [trace(case, t, error), trace(case, at, fitted, role="law", note=said[key])]
+            traces += [trace(case, t, error), trace(case, at, fitted, role="law", note=said.get(key, ""))]
         panel_legend(axes, members, markers=True, notes=notes)
     starts = max(law.starts for law in laws.values())
     over = (
         f"{starts} initial conditions (the problem's, and others changed in their last digits)"
         if starts > 1
-        else (
-            f"time windows, from one initial condition; the growth is fitted from a {EARLIEST}th of the "
-            "integration interval on, when an oscillation has shown its size"
-        )
+        else "time windows, from one initial condition"
+    )
+    lines = (
+        " Lines: the fitted growth, a constant floor with a power of t, printed with its 95 % interval. "
+        "Rounding errors without bias grow as t^1/2. The fit describes these samples and proves nothing "
+        "beyond them."
+        if said
+        else f" A growth is fitted from {FEWEST_STARTS} initial conditions on."
     )
     return picture(
         figure,
         "drift",
         "Growth of the energy error",
-        f"Markers: root mean square of the error over {over}. Lines: the fitted growth, a constant floor "
-        "with a power of t, printed with its 95 % interval. Rounding errors without bias grow as t^1/2. The "
-        "fit describes these samples and proves nothing beyond them."
-        + (f" {drift.told(starts)}." if starts > 1 else ""),
+        f"Markers: root mean square of the error over {over}."
+        + lines
+        + (f" {drift.told(starts)}." if said else ""),
         "Growth of each case. "
-        + "; ".join(f"{c.record.case.method}: {said[c.record.id]}" for c in shown)
+        + "; ".join(f"{c.record.case.method}: {said.get(c.record.id, NOT_CLEAR)}" for c in shown)
         + ".",
         Plot([Panel("", Axis("time", log=True), Axis(label, log=True), traces)]),
     )
@@ -82,19 +84,15 @@ def _visible(rows: Array) -> bool:
 
 
 def _drift(case: Drawn) -> Found | None:
-    """Return times, errors of shape (starts, n) and their law: as stored, or else from this trajectory."""
+    """Return times, errors of shape (starts, n) and their law, which a single trajectory has not."""
     stored = case.record.result.laws.get("energy")
     if stored is not None and "drift.energy" in case.series:
         t, rows = case.series["drift.t"], np.atleast_2d(case.series["drift.energy"])
-        return (t, rows, stored) if t.size > 1 else None
+        return (t, rows, clear(stored)) if t.size > 1 else None
     if not reached(case.record) or "error.energy" not in case.series:
         return None
     t, error = np.abs(case.series["t"] - case.series["t"][0]), case.series["error.energy"]
-    later = t >= t[-1] / EARLIEST
-    if later.sum() < 2 or not np.isfinite(error).all():
-        return None
-    law = drift.fit(t[later], error[None, later], signed=False)
-    return t[1:], error[None, 1:], law
+    return (t[1:], error[None, 1:], Law()) if t.size > 2 and np.isfinite(error).all() else None
 
 
 def _windows(t: Array, rows: Array) -> tuple[Array, Array]:
@@ -113,7 +111,7 @@ def _windows(t: Array, rows: Array) -> tuple[Array, Array]:
 def _law(law: Law, t: Array) -> tuple[Array, Array]:
     if law.law is None or t.size < 2:
         return np.empty(0), np.empty(0)
-    at = np.geomspace(max(t[0], t[-1] / EARLIEST) if law.starts == 1 else t[0], t[-1], LAW_POINTS)
+    at = np.geomspace(t[0], t[-1], LAW_POINTS)
     fitted = drift.curve(law, at)
     good = fitted > 0
     return at[good], fitted[good]

@@ -96,9 +96,9 @@ def test_another_reference_changes_positions_and_needs_no_run(toys, tmp_path, mo
 def test_another_law_needs_no_run(store, monkeypatch):
     before = reading.records(store)[0].result.laws
     assert before["energy"].starts == 3
-    monkeypatch.setattr(drift, "fit", lambda t, errors, *, signed: Law(law="linear", slope=1.0))
+    monkeypatch.setattr(drift, "fit", lambda t, errors, *, signed: Law(law="power", slope=1.0))
     monkeypatch.setattr(reading, "rule", lambda: "another")
-    assert reading.records(store)[0].result.laws["energy"] == Law(law="linear", slope=1.0)
+    assert reading.records(store)[0].result.laws["energy"] == Law(law="power", slope=1.0)
     assert is_complete(store)
 
 

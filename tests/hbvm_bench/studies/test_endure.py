@@ -23,7 +23,7 @@ OURS = "Gauss(s=8, h=1.0)"
 PEER = "Taylor(tol=1e-16)"
 
 
-def made(directory, years=1e6, starts=8, size=1e-17, bias=0.0):
+def made(directory, years=1e6, starts=16, size=1e-17, bias=0.0):
     """Store and read a result with random walks for errors."""
     campaign = endure.campaign(years, starts, [OURS, PEER])
     store = Store(directory)
@@ -78,7 +78,7 @@ def test_goals_are_reached_by_an_unbiased_walk_and_missed_by_a_biased_one(tmp_pa
 
 
 def test_a_small_drift_is_a_drift_all_the_same(tmp_path):
-    """Eight ends of one sign, five standard errors from 0: below the rms allowed, and no random walk."""
+    """Sixteen ends of one sign: below the rms allowed, and no random walk."""
     result = made(tmp_path, bias=-3e-20)
     small, within = goals_of(result, "a year's step")
     assert (small.reached, within.reached) == (True, False)
@@ -87,9 +87,9 @@ def test_a_small_drift_is_a_drift_all_the_same(tmp_path):
     assert ours.drift is not None
     assert ours.drift.law == "drift"
     (table, _) = endure.tables(result)
-    assert "0 of 8 positive" in str(table.rows[0])
+    assert "0 of 16 positive" in str(table.rows[0])
     assert (
-        "more than 3 of its standard errors from 0; of errors that do not drift, chance puts 2 %"
+        "more than 3 of its standard errors from 0; of errors that do not drift, chance puts 1 %"
         in table.note
     )
 
@@ -111,7 +111,7 @@ def test_the_lines_have_rms_law_and_speed(tmp_path):
     ours, peer = endure.lines(made(tmp_path))
     assert set(ours.rms) == {1e4, 1e5, 1e6}
     assert ours.drift is not None
-    assert ours.drift.law == "square root"
+    assert ours.drift.law == "power"
     assert peer.times_ours == pytest.approx(18.0)
 
 

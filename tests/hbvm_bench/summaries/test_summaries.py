@@ -129,8 +129,8 @@ def test_the_matrix_says_what_the_best_setting_did_and_why_others_did_not():
     [
         (Law(law="bounded", floor=2e-9), "bounded at 2.0e-09"),
         (Law(law="bounded"), "0"),
-        (Law(law="linear", slope=1.01, slope_low=0.9, slope_high=1.1), "t^1.01 (0.90 to 1.10)"),
-        (Law(law="square root", slope=0.5), "t^0.50"),
+        (Law(law="power", slope=1.01, slope_low=0.9, slope_high=1.1), "t^1.01 (0.90 to 1.10)"),
+        (Law(law="power", slope=0.5), "t^0.50"),
         (Law(law="drift", slope=0.57, mean=-8.51e-14, mean_error=9.4e-15), "drift (-8.5e-14 ± 9e-15)"),
         (Law(law="exponential", growth=0.25), "exp(0.25 t)"),
         (Law(why="too short"), "too short"),
@@ -141,20 +141,43 @@ def test_a_law_in_a_few_signs(law, text):
 
 
 def test_laws_are_counted_by_family_on_the_trajectory_only():
-    kept = {"energy": Law(law="bounded", floor=1e-9), "angular_momentum": Law(law="linear")}
+    kept = {
+        "energy": Law(law="bounded", floor=1e-9, starts=16),
+        "angular_momentum": Law(law="power", starts=16),
+    }
     run = [record("Gauss(s=2, h=0.1)", laws=kept), record("Taylor()", laws=kept, violation="lost")]
     assert laws.by_method(run) == {"Gauss": [kept["energy"]]}
 
 
 def test_powers_of_t_are_told_by_their_exponents_and_not_by_names():
-    found = [Law(law="square root", slope=0.54, starts=3), Law(law="power", slope=0.53, starts=3)]
+    found = [Law(law="power", slope=0.54, starts=16), Law(law="power", slope=0.53, starts=16)]
     made = laws.table(
         [record(f"Gauss(s={s}, h=0.1)", laws={"energy": one}) for s, one in enumerate(found, 1)]
     )
     assert made is not None
     assert made.head == ("method", "bounded", "t^a", "exp t", "drift", "not clear", "a")
     assert made.rows == [("Gauss", "–", "2", "–", "–", "–", "0.54 (0.53 to 0.54)")]
-    assert made.note.endswith("A root mean square over 3 starts is known to ±41 %.")
+    assert made.note.endswith("A root mean square over 16 starts is known to ±18 %.")
+
+
+def test_a_law_from_fewer_than_sixteen_starts_is_not_clear():
+    few = Law(law="power", slope=0.5, slope_low=0.4, slope_high=0.6, starts=15)
+    enough = replace(few, starts=16)
+    assert laws.clear(enough) is enough
+    assert laws.text(laws.clear(few)) == "not clear from 15 initial conditions"
+    assert laws.text(laws.clear(Law(law="bounded", starts=1))) == "not clear from 1 initial condition"
+    made = laws.table([record("Taylor()", laws={"energy": few})])
+    assert made is not None
+    assert made.rows == [("Taylor", "–", "–", "–", "–", "1", "–")]
+    assert laws.clear(Law(law="linear", slope=0.9, starts=16)).law == "power"
+
+
+def test_no_drift_is_a_growth_whose_interval_has_that_of_unbiased_rounding():
+    def found(low, starts=16):
+        law = Law(law="power", slope=0.55, slope_low=low, slope_high=0.6, starts=starts)
+        return needs._without_drift(record("Taylor()", laws={"energy": law}))
+
+    assert [found(0.45), found(0.51), found(0.45, starts=15)] == [True, False, False]
 
 
 def test_fairness_counts_settings():
