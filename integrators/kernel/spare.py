@@ -36,7 +36,8 @@ class Pair:
         if self._content is None or self.par != par:
             return False
         self.own.renew(self._content[0])
-        self.partial.renew(self._content[1])
+        if self.partial.repointed:  # otherwise nothing depends on what the last partial step left there
+            self.partial.renew(self._content[1])
         return True
 
 

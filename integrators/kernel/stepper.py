@@ -491,8 +491,8 @@ class HBVMStepper(ABC):
 
     def _fill(self, between: int, times: Array, *steps_and_parts: NDArray[Any]) -> Made:
         """Make samples, in chunks so that Ctrl-C is heard between them."""
-        times, given = np.ascontiguousarray(times), [np.ascontiguousarray(part) for part in steps_and_parts]
-        addresses = [address(array) for array in given]
+        times, given = np.ascontiguousarray(times), tuple(map(np.ascontiguousarray, steps_and_parts))
+        addresses = tuple(map(address, given))
         out = np.empty((times.size, self._dim))
         if self._vectors:
             self._vectors.room(times.size)
@@ -521,11 +521,12 @@ class HBVMStepper(ABC):
         targets: int = 0, parts: int = 0, /,
     ) -> int:  # fmt: skip
         """Call the kernel once; put the implicit solver to work where it is wanted."""
-        if self._context.implicit.wanted == FOR_VECTORS:
-            self._make_implicit()
-            self._context.implicit.wanted = NOT_WANTED
-        elif self._wants_solver:
-            self._take_implicit()
+        if self._wants_solver:
+            if self._context.implicit.wanted == FOR_VECTORS:
+                self._make_implicit()
+                self._context.implicit.wanted = NOT_WANTED
+            else:
+                self._take_implicit()
         with self._pace:
             outcome = self._enter(
                 what, self._context.address, self._partial.address, between, times.size,

@@ -247,7 +247,7 @@ def integrate(
     error = stepper.error if status is Status.USER_ERROR and offers(stepper, KeptError) else None
     if error is not None and stepper.t == problem.t0:  # nothing is reached that could be kept
         raise error
-    stats = stepper.stats.copy() if before is None else both(before, stepper.stats)
+    stats = stepper.stats if before is None else both(before, stepper.stats)
     if isinstance(problem.system, Foreign):
         stats.extra = {**stats.extra, "field": problem.system.written}
     if watch is not None and watch.failure:

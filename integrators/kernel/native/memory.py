@@ -256,6 +256,8 @@ class Memory(_Slots):
         For compiled functions.
     """
 
+    repointed: bool = True
+    """Whether it points elsewhere than when `content` was called."""
     word_of: ClassVar[dict[str, int]] = {}
     """The word of each slot, those of parts too."""
     _all: ClassVar[dict[str, Slot]] = {}
@@ -324,15 +326,15 @@ class Memory(_Slots):
 
     def content(self) -> "Content":
         """Return a copy of all that it holds, for `renew`."""
-        self._moved = False
+        self.repointed = False
         return self._memory.copy(), self._pointed.copy()
 
     def renew(self, content: "Content") -> None:
         """Take back what `content` returned."""
         self._memory[:], pointed = content
-        if self._moved:
+        if self.repointed:
             self._point_as(pointed)
-            self._moved = False
+            self.repointed = False
 
     def _point_as(self, pointed: Mapping[int, NDArray[Any]]) -> None:
         self._pointed.clear()
@@ -340,7 +342,7 @@ class Memory(_Slots):
 
     def point(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Let slots point to arrays, and keep these alive."""
-        self._moved = True
+        self.repointed = True
         for name, array in arrays.items():
             place = self.word_of[name]
             self._pointed[place] = array

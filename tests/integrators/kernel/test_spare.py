@@ -105,6 +105,16 @@ def test_an_implicit_solver_that_came_later_is_not_handed_on():
     assert bits(again) == bits(first)
 
 
+@pytest.mark.parametrize("method", [HBVM(), HBVM(k=8, s=4, h=0.05)], ids=repr)
+def test_what_is_no_number_is_not_handed_on(method):
+    field = problems.VectorField(lambda t, y, m: [m.sqrt(y[0]) - 2.0 - y[1], y[0] * y[1]], dim=2)
+    fails = problems.Problem(field, y0=[1.0, 1.0], t_end=5.0)
+    goes = problems.Problem(field, y0=[9.0, -1.0], t_end=0.5)
+    alone = bits(integrate(goes, method))
+    assert integrate(fails, method).status.failed
+    assert bits(integrate(goes, method)) == alone
+
+
 def test_neither_large_memory_nor_much_is_kept(monkeypatch):
     made = prepared(HBVM(), KEPLER.system)
 
