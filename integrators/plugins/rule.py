@@ -4,11 +4,10 @@ They are the kernel's own where it has them (`integrators.kernel.step.rule`, whi
 measured by).
 """
 
-from integrators.kernel.step.rule import FLOOR, PATIENCE, ROUNDING, STAGNATION
+from integrators.kernel.step.rule import FARTHEST, FLOOR, PATIENCE, ROUNDING, STAGNATION
+from integrators.kernel.step.rule import MOST_ITERATIONS as MAX_ITERATIONS
 from integrators.kernel.step.rule import TOLERANCE as CONVERGED
 
 __all__ = ["CONVERGED", "FARTHEST", "FLOOR", "MAX_ITERATIONS", "MODES", "PATIENCE", "ROUNDING", "STAGNATION"]
 
-MAX_ITERATIONS = 200  # as `integrators.kernel.step.iterate`
 MODES = 13  # extrapolated, as `integrators.kernel.tables` at fixed steps: P_j(2) grows like 5.8^j
-FARTHEST = 2.0  # previous steps: the polynomial of the last step is extrapolated no farther

@@ -11,14 +11,7 @@ from typing import Any
 
 from integrators.kernel.ensemble.group import Group
 from integrators.kernel.parts.estimate import (
-    AT_ERROR,
-    BEFORE_ERROR,
-    BEFORE_LAST,
     GAMMA_0,
-    GAMMA_1,
-    GAMMA_2,
-    GAMMA_3,
-    LAST,
 )
 from integrators.kernel.simd.emit import DOUBLE, splat
 from integrators.kernel.simd.operations import greatest, where
@@ -106,19 +99,13 @@ class Control:
                 for i in range(width):
                     d = w.at(start, 1, i)
                     found, start_value, end_value = self.coefficients(d)
-                    low = rules.lowest(found[GAMMA_1], found[GAMMA_2], found[GAMMA_3])
-                    high = greatest(found[BEFORE_LAST], found[LAST])
+                    low, high, own, here, last = rules.judged(
+                        *found, self.number("error_decay"), self.number("defect_decay")
+                    )
                     note(doubtful, rules.is_doubtful(low, high, self.number("doubt")))
                     note(changing, rules.changes(low, high, found[GAMMA_0]))
-                    own = greatest(found[GAMMA_0], low)
                     moved = w.get(w.state, w.at(1, w.form.rows, d) if w.form.second else d).absolute()
                     scale, slope = greatest(scale, moved + self.h * own), greatest(slope, own)
-                    here = rules.next_coefficient(
-                        found[AT_ERROR], found[BEFORE_ERROR], self.number("error_decay")
-                    )
-                    last = rules.next_coefficient(
-                        found[LAST], found[BEFORE_LAST], self.number("defect_decay")
-                    )
                     gamma_error, gamma_last = greatest(gamma_error, here), greatest(gamma_last, last)
                     gap = greatest(gap, self.gap(d, high, start_value, end_value))
                 w.put(gap, w.array(Group.slots["gaps"]), start)
@@ -249,7 +236,7 @@ class Control:
 
     def take(self) -> None:
         """Take the step, and aim at the next one, in the lanes where that is all."""
-        from integrators.kernel.step.control import SHORTEST, is_good
+        from integrators.kernel.step.control import is_distinct, is_good
         from integrators.kernel.step.sums import time_after
 
         w, b = self.w, self.w.b
@@ -272,7 +259,7 @@ class Control:
             (rest * length).compare(">", 0.0),
             rest.absolute().compare(">", length.absolute()),
             length.absolute().compare("<=", self.number("longest")),
-            length.absolute().compare(">", t.absolute() * SHORTEST),
+            is_distinct(length, t).value,
             since.compare("<", self.row("unwatched")),
         )
         w.put(w.one.where(good, 0.0), w.array(slots["ordinary"]))

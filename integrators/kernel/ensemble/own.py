@@ -16,9 +16,9 @@ from integrators.kernel.native.jit import compiled
 from integrators.kernel.parts.implicit import FIXED_POINT
 from integrators.kernel.parts.kinks import EXTRAPOLATED
 from integrators.kernel.simd.memory import call_steps, put, splat8
-from integrators.kernel.step.begin import FARTHEST, INFINITY
-from integrators.kernel.step.control import SHORTEST, defect_power, error_power
-from integrators.kernel.step.kinks import arrived, end_behind
+from integrators.kernel.step.begin import INFINITY, is_within_reach
+from integrators.kernel.step.control import defect_power, error_power, is_distinct
+from integrators.kernel.step.kinks import arrived, end_behind, is_near_one
 from integrators.kernel.step.loop import reset
 from integrators.kernel.step.rule import FIRST_RATE, SMALLEST
 from integrators.kernel.step.vary import (
@@ -124,11 +124,11 @@ def aim(group, lane):
     """Set the length of a lane's next step; return 0 if none is short enough."""
     ctx = context_at(group.contexts[lane])
     h, length = within(ctx, ctx.controller.next_length), ctx.length
-    if not abs(h) > SHORTEST * abs(ctx.t0):
+    if not is_distinct(h, ctx.t0):
         return 0
     group.h[lane], group.t0[lane], group.time_low[lane] = h, ctx.t0, ctx.time_low
     # Where the step begins and how long it is on the one whose values are there; 0: on none.
-    group.ratio[lane] = h / length if length != 0.0 and abs(h / length) <= FARTHEST else 0.0
+    group.ratio[lane] = h / length if is_within_reach(h, length) else 0.0
     group.begin[lane] = 0.0 if ctx.controller.rejected else 1.0
     group.before[lane] = group.sweeps[lane]
     group.alive[lane] = 1.0
@@ -141,7 +141,7 @@ def aim(group, lane):
         ctx.controller.defect_behind,
     )
     group.stop[lane] = ctx.controller.stop
-    suspect = ctx.controller.attempts > 0 or ctx.kinks.count > 0 or (ctx.t0 - ctx.kinks.doubt_end) * h < 0.0
+    suspect = ctx.controller.attempts > 0 or is_near_one(ctx, h)
     first = ctx.controller.length_behind == 0.0 or h != ctx.controller.next_length
     group.unwatched[lane] = 0.0 if suspect or first else float(CRAWL_STEPS - ctx.counters.steps % CRAWL_STEPS)
     group.since[lane] = 0.0

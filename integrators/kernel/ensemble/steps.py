@@ -25,6 +25,7 @@ from integrators.kernel.simd.values import Value
 from integrators.kernel.step.rule import (
     LOG_REST,
     LOG_REST_VARYING,
+    MOST_IN_LANES,
     NOTHING,
     TOLERANCE,
 )
@@ -34,8 +35,6 @@ from problems.systems.base import System
 INFINITY = float("inf")
 UNROLLED = 640  # products of a sweep up to which stages and rows are written out
 ABREAST = 2  # rows of a product side by side: their sums stay in registers, and share its matrix
-AGAIN = 40  # sweeps after which a start that was extrapolated is given up for one without values
-MOST = 80  # sweeps after which a trajectory leaves
 
 
 @dataclass(frozen=True)
@@ -453,7 +452,7 @@ class Steps(Writer):
         for variable, value in news:
             b.store(value.value, variable)
 
-        ends = (AGAIN,) if form.varying else (AGAIN, MOST)
+        ends = (MOST_IN_LANES,) if form.varying else (MOST_IN_LANES, 2 * MOST_IN_LANES)
         over = [b.icmp_signed("==", tried, ir.Constant(INTEGER, n)) for n in ends]
         all_of_them, none = (ir.Constant(active.type, [bit] * form.lanes) for bit in (1, 0))
         late = [b.select(flag, all_of_them, none) for flag in over]

@@ -19,8 +19,8 @@ from integrators.kernel.implicit.stages import (
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.parts.implicit import AUTO
 from integrators.kernel.simd.memory import get, largest, put, splat8, spread
-from integrators.kernel.step.begin import FARTHEST, INFINITY, prepare, start_elsewhere
-from integrators.kernel.step.rule import STAGNATION
+from integrators.kernel.step.begin import INFINITY, prepare, start_elsewhere
+from integrators.kernel.step.rule import FARTHEST, STAGNATION
 from integrators.kernel.step.stopping import is_rounding
 
 MOST_CORRECTIONS = 40

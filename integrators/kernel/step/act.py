@@ -4,7 +4,7 @@ from integrators.kernel.context import ACCUMULATE, ACTS, BY_VALUES, DONE, UNSOLV
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.parts.events import BEGIN_ANEW, CHANGE
 from integrators.kernel.simd.memory import call_look
-from integrators.kernel.step.control import SHORTEST
+from integrators.kernel.step.control import is_distinct
 from integrators.kernel.step.vary import attempt
 
 ONWARD = 1.25  # times that are probably enough to see the next one
@@ -20,7 +20,7 @@ def end_at_action(ctx):
     if outcome != ACTS:
         return outcome
     part = (events.time - ctx.t0) - ctx.time_low
-    if not abs(part) > SHORTEST * abs(ctx.t0):
+    if not is_distinct(part, ctx.t0):
         return ACCUMULATE
     events.length_before = ctx.h if abs(ctx.h) > abs(controller.length_after) else controller.length_after
     if part != ctx.h:

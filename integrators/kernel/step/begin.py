@@ -10,13 +10,13 @@ from integrators.kernel.native.jit import compiled, for_both_widths
 from integrators.kernel.simd.lanes import fma
 from integrators.kernel.simd.memory import get, put, put_lower, put_upper, splat8, spread
 from integrators.kernel.simd.operations import binary_log
+from integrators.kernel.step.rule import FARTHEST
 from integrators.kernel.step.size import take_sizes
 from integrators.kernel.step.stages import offset
 from integrators.kernel.step.sums import drift, part_of_drift, time_of_step
 from integrators.kernel.step.sweep import multiply, product, product_for_one, product_of_two, project, through
 from integrators.kernel.tables import PER_OCTAVE, THROUGH
 
-FARTHEST = 2.0  # no extrapolation farther than this many previous steps
 INFINITY = float("inf")
 
 
@@ -191,6 +191,12 @@ def start_onward(ctx):
 
 
 @compiled
+def is_within_reach(h, length):
+    """Whether first stages of a step of length h may come from a step of ``length``; 0: there is none."""
+    return length != 0.0 and abs(h / length) <= FARTHEST
+
+
+@compiled
 def predict(ctx, source, length, first):
     """First stages from the values of ``source``, of a step of ``length``, if that is not too far away.
 
@@ -203,7 +209,7 @@ def predict(ctx, source, length, first):
     first : float
         Where this step begins on it: at its end, 1, or at its start, 0.
     """
-    if length != 0.0 and abs(ctx.h / length) <= FARTHEST:
+    if is_within_reach(ctx.h, length):
         start_elsewhere(ctx, source, first, ctx.h / length)
     else:
         start_plain(ctx)

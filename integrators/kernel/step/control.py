@@ -3,7 +3,7 @@
 from math import log
 
 from integrators.kernel.native.jit import for_both_widths
-from integrators.kernel.simd.operations import binary_log, greatest, least, where
+from integrators.kernel.simd.operations import binary_log, greatest, least, size, where
 
 SAFETY, SHRINK = 0.9, 0.2  # of the length from one step to the next
 SHRINKING = 0.7  # of what would have met the tolerance, after a step whose error was too large (logarithms)
@@ -47,6 +47,12 @@ def log_factor(aim, estimate, behind, change):
     trend = change + greatest(aim - FORESEEN, behind) - estimate
     trend = where(behind < INFINITY, where(trend < 0.0, trend, TRUST * trend), 0.0)
     return where(factor < 0.0, SHRINKING * factor, greatest(CAUTION * factor, factor - HELD) + trend)
+
+
+@for_both_widths
+def is_distinct(h, t):
+    """Whether a step of length h from time t can be told from none."""
+    return size(h) > SHORTEST * size(t)
 
 
 @for_both_widths

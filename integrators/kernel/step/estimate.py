@@ -170,6 +170,27 @@ def next_coefficient(here, before, decay):
 
 
 @for_both_widths
+def judged(
+    gamma_0, gamma_1, gamma_2, gamma_3, before_error, at_error, before_last, last, error_decay, defect_decay
+):
+    """Return what the sizes of a row's coefficients say of it; see `GAMMA_0`.
+
+    Returns
+    -------
+    low, high : float
+        The largest of those that a step resolves first, but for the mean, and of the last two.
+    slope : float
+        The largest of the low ones and the mean: how steep the field is.
+    error, defect : float
+        What the errors are estimated by.
+    """
+    low, high = lowest(gamma_1, gamma_2, gamma_3), greatest(before_last, last)
+    error = next_coefficient(at_error, before_error, error_decay)
+    defect = next_coefficient(last, before_last, defect_decay)
+    return low, high, greatest(gamma_0, low), error, defect
+
+
+@for_both_widths
 def slope_beside(slope, steepest, part):
     """Return what the field of a block counts as, at least a part of the steepest in its group."""
     return greatest(slope, part * steepest)
@@ -340,15 +361,22 @@ def measure_blocks(ctx):
     doubtful, changing = False, False
     for d in range(ctx.rows):
         b, found = blocks.of_row[d], ctx.estimate.coefficients + 8 * d
-        low = lowest(found[GAMMA_1], found[GAMMA_2], found[GAMMA_3])
-        high = greatest(found[BEFORE_LAST], found[LAST])
-        slope = greatest(found[GAMMA_0], low)
+        low, high, slope, error, defect = judged(
+            found[GAMMA_0],
+            found[GAMMA_1],
+            found[GAMMA_2],
+            found[GAMMA_3],
+            found[BEFORE_ERROR],
+            found[AT_ERROR],
+            found[BEFORE_LAST],
+            found[LAST],
+            error_decay,
+            defect_decay,
+        )
         doubtful |= is_doubtful(low, high, doubt)
         changing |= changes(low, high, found[GAMMA_0])
         scale[b] = greatest(scale[b], size(momentum(ctx, d)) + h * slope)
         slopes[b] = greatest(slopes[b], slope)
-        error = next_coefficient(found[AT_ERROR], found[BEFORE_ERROR], error_decay)
-        defect = next_coefficient(found[LAST], found[BEFORE_LAST], defect_decay)
         gamma_error[b] = greatest(gamma_error[b], error)
         gamma_last[b] = greatest(gamma_last[b], defect)
     for b in range(blocks.count):

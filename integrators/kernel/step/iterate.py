@@ -3,12 +3,10 @@
 from integrators.kernel.context import BY_VALUES, DIVERGED, DONE, NOT_FINITE, RUNNING
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.step.begin import INFINITY, rewind, start_plain
-from integrators.kernel.step.rule import ROUNDING
+from integrators.kernel.step.rule import MOST_ITERATIONS
 from integrators.kernel.step.size import SIZES_LAST, change, take_sizes
-from integrators.kernel.step.stopping import further, judge, left_over, stagnates
+from integrators.kernel.step.stopping import further, judge, left_over, stagnates, untested_next
 from integrators.kernel.step.sweep import sweep_measured, sweep_to_the_end
-
-MAX_ITERATIONS = 200
 
 
 @compiled
@@ -42,7 +40,7 @@ def test(ctx, strict):
             extra_iterations(ctx, left)
         else:
             solver.outcome = DONE
-    elif solver.tried >= MAX_ITERATIONS:
+    elif solver.tried >= MOST_ITERATIONS:
         restart(ctx, DIVERGED)
 
 
@@ -94,11 +92,7 @@ def close(ctx):
     if solver.outcome == DONE:
         ctx.solved = BY_VALUES
         if solver.predicted:
-            # Two tests tell how the changes fall; more mean that the first came early. It came late where
-            # nothing was left to fall: then further changes are rounding, however many were looked at.
-            falling = solver.tests - solver.stalled
-            late = solver.stalled == 0 and solver.tests <= 2 and solver.last <= ROUNDING
-            solver.free = max(solver.free + falling - (3 if late else 2), 0)
+            solver.free = untested_next(solver.free, solver.tests, solver.stalled, solver.last)
     else:
         ctx.length = 0.0
     return solver.outcome

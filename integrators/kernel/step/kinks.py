@@ -35,7 +35,7 @@ def kink(ctx, ends):
         if ctx.line or not (ends and (kinks.doubt < INFINITY or surfaces.crossed)):
             return False
         kinks.border_ahead = EXTRAPOLATED
-        suspect = surfaces.crossed or kinks.count > 0 or (ctx.t0 - kinks.doubt_end) * ctx.h < 0.0
+        suspect = surfaces.crossed or is_near_one(ctx, ctx.h)
         suspect = suspect or kinks.border == START or ends_at_break(ctx)
         if not (suspect or kinks.apart):
             if kinks.border == EXTRAPOLATED:
@@ -83,6 +83,12 @@ def count(ctx, t, h):
         place = kinks.places + 2 * (found - 1)
         place[0] = t
         place[1] = h
+
+
+@compiled
+def is_near_one(ctx, h):
+    """Whether a step of length h lies where one may be: a kink was met, or a step there failed."""
+    return ctx.kinks.count > 0 or (ctx.t0 - ctx.kinks.doubt_end) * h < 0.0
 
 
 @for_both_widths

@@ -37,6 +37,11 @@ FALL = 1e15
 # 3e-15 3 to 8e-18. At loose tolerances it is seen: a pendulum's energy grows by 2.3e-18 in each step of
 # HBVM(12, 6) at 1e-8, and not with 3e-19, which excites fast oscillations at rest, though.
 LOG_REST, LOG_REST_VARYING = log2(3e-19), log2(3e-17)
+# Iterations after which a start is given up: for one without extrapolation, or, if it was one, for a shorter
+# step or the implicit solver. In lanes all the others wait; there a trajectory that has had twice as many
+# leaves, and is computed alone.
+MOST_ITERATIONS, MOST_IN_LANES = 200, 40
+FARTHEST = 2.0  # previous steps: their polynomial is extrapolated no farther
 FIRST_RATE = log2(0.01)  # contraction (binary logarithm) before any is measured
 
 # --- sizes of blocks, which changes are relative to -------------------------------------------------

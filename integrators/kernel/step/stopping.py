@@ -5,7 +5,7 @@
 
 from math import log2
 
-from integrators.kernel.native.jit import for_both_widths
+from integrators.kernel.native.jit import compiled, for_both_widths
 from integrators.kernel.simd.operations import binary_log, greatest, least, where
 from integrators.kernel.step.rule import FALL, LEAST, PATIENCE, ROUNDING, STAGNATION, STEEP
 
@@ -17,6 +17,10 @@ LOG_PROMISE, LOG_FALL = log2(3.0 * LEAST), log2(FALL)
 # drifts by 2e-18 to 7e-17 in each step, and as much, in another direction, with 60 evaluations more.
 FASTEST, SLOWEST = -10.0, -1.0
 MOST_EXTRA = 16.0  # evaluations without a test after the last one, at most
+MOST_UNTESTED = 12.0  # iterations in a row without a test before it, at most
+LEAST_RATE, MOST_RATE = log2(1e-4), log2(0.9)
+LOG_RATE_UNSEEN = log2(0.7)  # to the logarithm of the contraction, where the last change was nothing
+MOST_TIMES, TRIAL = 3.0, 4.0  # times as many iterations as aimed at are too many, if a trial says so
 
 
 @for_both_widths
@@ -67,6 +71,54 @@ def judge(change, last, best, stalled, rate, tried, tolerance, resolution):
         small | known,
         greatest(change, resolution),
     )
+
+
+@compiled
+def untested_next(untested, tests, stalled, last):
+    """Return how many iterations of the next step need no test, by those of a fixed step that is solved.
+
+    Two tests tell how the changes fall; more mean that the first came early. It came late where nothing was
+    left to fall: then further changes are rounding, however many were looked at.
+
+    Parameters
+    ----------
+    untested, tests, stalled : int
+        Iterations of this step without a test before the first one, tests, and those that did not decrease.
+    last : float
+        The last change.
+    """
+    late = stalled == 0 and tests <= 2 and last <= ROUNDING
+    return max(untested + tests - stalled - (3 if late else 2), 0)
+
+
+@for_both_widths
+def untested(change, rate, log_trusted):
+    """Return how many iterations of an adaptive step need no test until its change may be trusted.
+
+    Parameters
+    ----------
+    change, rate, log_trusted : float
+        Binary logarithms of the present change, of the contraction and of the change to be trusted.
+    """
+    return least(greatest((log_trusted - change) / rate - 1.0, 0.0), MOST_UNTESTED)
+
+
+@for_both_widths
+def rate_since(first, change, tries):
+    """Return the binary logarithm of the contraction over so many iterations, from that of two changes."""
+    return least(greatest((change - first) / tries, LEAST_RATE), MOST_RATE)
+
+
+@for_both_widths
+def rate_unseen(rate):
+    """Return what the contraction counts as where nothing is left of the change."""
+    return greatest(rate + LOG_RATE_UNSEEN, LEAST_RATE)
+
+
+@for_both_widths
+def takes_too_long(change, rate, tries, log_rest, busy):
+    """Whether a shorter step is cheaper than to iterate on, after a trial; ``busy``: iterations to aim at."""
+    return (tries >= TRIAL) & (tries + (log_rest - change) / rate > MOST_TIMES * busy)
 
 
 @for_both_widths

@@ -11,7 +11,7 @@ from integrators.kernel.native.jit import compiled
 from integrators.kernel.parts.surfaces import AT_ORIGIN, END_ACROSS, MOST_SIDES, NO_SURFACE
 from integrators.kernel.simd.memory import call_field
 from integrators.kernel.step.begin import INFINITY
-from integrators.kernel.step.control import SHORTEST
+from integrators.kernel.step.control import is_distinct
 from integrators.kernel.step.kinks import end_behind
 from integrators.kernel.step.sample import interpolate
 
@@ -134,7 +134,7 @@ def locate(ctx, outcome, fits):
 @compiled
 def try_length(ctx, length):
     """Let the next attempt have a length; ORDINARY if that is too short."""
-    if not length > SHORTEST * abs(ctx.t0):
+    if not is_distinct(length, ctx.t0):
         return ORDINARY
     ctx.controller.next_length = length if ctx.h > 0.0 else -length
     return AGAIN

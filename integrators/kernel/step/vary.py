@@ -3,7 +3,7 @@
 Where the fixed-point iteration allows much less than the errors do, the implicit solver takes over.
 """
 
-from math import log, log2
+from math import log
 
 from integrators.kernel.context import (
     BY_VALUES,
@@ -22,7 +22,7 @@ from integrators.kernel.parts.implicit import FIXED_POINT
 from integrators.kernel.parts.kinks import NOTHING, START
 from integrators.kernel.parts.surfaces import AT_STEP_END, END_ACROSS, NO_SURFACE
 from integrators.kernel.simd.operations import binary_log, least
-from integrators.kernel.step.begin import FARTHEST, INFINITY, begin, on_table, set_step
+from integrators.kernel.step.begin import INFINITY, begin, on_table, set_step
 from integrators.kernel.step.control import (
     APPROACH,
     CLOSE,
@@ -35,6 +35,7 @@ from integrators.kernel.step.control import (
     bounded,
     defect_power,
     error_power,
+    is_distinct,
     is_good,
     log_of_order,
     log_ratio,
@@ -47,7 +48,8 @@ from integrators.kernel.step.handover import solve_implicitly, want_solver
 from integrators.kernel.step.iterate import close, extra_iterations, settle, test
 from integrators.kernel.step.kinks import count, keep_end, kink, undo
 from integrators.kernel.step.reversible import keep_pace
-from integrators.kernel.step.rule import FIRST_RATE, FUTILE_PART, ROUNDING, SCALE_LASTS
+from integrators.kernel.step.rule import FARTHEST, FIRST_RATE, FUTILE_PART, ROUNDING, SCALE_LASTS
+from integrators.kernel.step.stopping import rate_since, rate_unseen, takes_too_long, untested
 from integrators.kernel.step.sums import time_after
 from integrators.kernel.step.surfaces import AGAIN, REACHED, leave, locate, look_across
 from integrators.kernel.step.sweep import sweep_measured
@@ -58,10 +60,6 @@ GROW = FARTHEST  # of the length from one step to the next, at most
 # terms of exp(h w) by the iterations after it: 24 take as long as 18 and end, far out in a rotating frame,
 # with three times the error; 36 err by 1e-14 in one step of a diffusion.
 BUSY = 18.0
-MOST_UNTESTED = 12
-MOST, TRIAL = 3.0, 4  # times as many iterations as that are too many, if it looks like it after a trial
-LEAST_RATE, MOST_RATE = log2(1e-4), log2(0.9)
-LOG_RATE_UNSEEN = log2(0.7)  # to the logarithm of the contraction, where the last change was nothing
 # The implicit solver takes over after so many steps in a row that the iteration keeps from growing where the
 # errors would allow so much longer ones. Its steps cost one or two of 18 sweeps through memory, and ten of
 # those of few rows or of the second-order form; the more rows, the more. Beyond MOST_ROWS they are too dear
@@ -112,17 +110,16 @@ def iterate(ctx):
         return settle(ctx)
     first, known = binary_log(solver.last), solver.rate
     rate = known
-    change, most = first, MOST * BUSY
+    change = first
     trusted, log_trusted = solver.trusted, solver.log_trusted
     while solver.outcome == RUNNING:
-        untested = min(int((log_trusted - change) / rate) - 1, MOST_UNTESTED)
-        strict = sweep_measured(ctx, max(untested, 0))
+        strict = sweep_measured(ctx, int(untested(change, rate, log_trusted)))
         tries = solver.tried - tried
         if strict > ROUNDING:
             change = binary_log(strict)
-            rate = min(max((change - first) / tries, LEAST_RATE), MOST_RATE)
+            rate = rate_since(first, change, tries)
         elif strict == 0.0 and tries > 1:
-            rate = max(rate + LOG_RATE_UNSEEN, LEAST_RATE)
+            rate = rate_unseen(rate)
         solver.rate = rate
         test(ctx, strict)
         if solver.tried <= tried:  # started anew
@@ -130,7 +127,7 @@ def iterate(ctx):
         if solver.outcome == RUNNING:
             if strict <= trusted:
                 extra_iterations(ctx, strict)
-            elif tries >= TRIAL and tries + (solver.log_rest - change) / rate > most:
+            elif takes_too_long(change, rate, tries, solver.log_rest, BUSY):
                 solver.outcome = DIVERGED  # not yet, but a shorter step is cheaper
                 solver.rate = known
     return close(ctx)
@@ -265,7 +262,7 @@ def ready(ctx):
         ):
             return SLIDING
         h = within(ctx, controller.next_length)
-        too_short = not abs(h) > SHORTEST * abs(ctx.t0)
+        too_short = not is_distinct(h, ctx.t0)
         if (
             (too_short or controller.attempts > 0)
             and failure == UNDERFLOW
@@ -298,7 +295,7 @@ def ready(ctx):
 @compiled
 def solve_at_pace(ctx):
     """Solve the step ahead, whose length nothing but the density of the steps determines."""
-    if not abs(ctx.controller.next_length) > SHORTEST * abs(ctx.t0):
+    if not is_distinct(ctx.controller.next_length, ctx.t0):
         return UNDERFLOW
     outcome = attempt(ctx, ctx.controller.next_length)
     ctx.solved = BY_VALUES if outcome == DONE else UNSOLVED

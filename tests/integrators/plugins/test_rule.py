@@ -5,7 +5,6 @@ from pathlib import Path
 
 import integrators.plugins
 from integrators.kernel import tables
-from integrators.kernel.step import iterate
 from integrators.kernel.step import rule as kernel
 from integrators.plugins import rule
 
@@ -13,10 +12,12 @@ FOLDER = Path(integrators.plugins.__path__[0])
 
 
 def test_they_are_the_kernel_s():
-    ours = (rule.CONVERGED, rule.ROUNDING, rule.STAGNATION, rule.PATIENCE, rule.FLOOR)
-    theirs = (kernel.TOLERANCE, kernel.ROUNDING, kernel.STAGNATION, kernel.PATIENCE, kernel.FLOOR)
+    ours = (rule.CONVERGED, rule.ROUNDING, rule.STAGNATION, rule.PATIENCE, rule.FLOOR, rule.FARTHEST)
+    theirs = (
+        kernel.TOLERANCE, kernel.ROUNDING, kernel.STAGNATION, kernel.PATIENCE, kernel.FLOOR, kernel.FARTHEST
+    )  # fmt: skip
     assert ours == theirs
-    assert (rule.MAX_ITERATIONS, rule.MODES) == (iterate.MAX_ITERATIONS, tables.MODES)
+    assert (rule.MAX_ITERATIONS, rule.MODES) == (kernel.MOST_ITERATIONS, tables.MODES)
 
 
 def test_no_plugin_has_one_of_its_own():
