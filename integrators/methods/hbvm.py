@@ -100,7 +100,7 @@ class HBVM(MethodBase):
         momenta of one body, else each component), as estimated by
         ``h |gamma_s|^2 / max_j |gamma_j|``. The steps then vary. 3e-16 where neither
         ``h`` nor ``tol`` is given: as accurate as double precision allows. In lanes
-        of an ensemble, whose methods have eight nodes, 1e-14 is that.
+        of an ensemble, whose methods have eight or twelve nodes, 1e-14 is that.
     solver : {"auto", "fixed_point", "newton", "blended"}
         How the stage equations are solved. The fixed-point iteration contracts while h
         times the largest frequency is below about s. ``"newton"``: simplified Newton
@@ -284,14 +284,14 @@ class HBVM(MethodBase):
 
             if self.k is not None and self.s is not None:
                 return program((self.k, self.s, None))
-            from integrators.methods.automatic import ACCURATE_IN_LANES, FEW, choose, choose_projected
+            from integrators.methods.automatic import ACCURATE_IN_LANES, MANY, choose, choose_projected
 
             if self.projection:
                 return program(choose_projected(tol))
             alone, many = choose(system, tol), choose(system, tol, lanes=True)
             made = program(alone)
             if many != alone:
-                accurate = many[0] == FEW and tol == TOLERANCE
+                accurate = many[0] < MANY and tol == TOLERANCE
                 made.for_many = lambda: program(many, ACCURATE_IN_LANES if accurate else tol)
             return made
         from integrators.kernel.program import HBVMProgram  # numba is for those who integrate

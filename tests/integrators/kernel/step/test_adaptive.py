@@ -211,6 +211,9 @@ def test_k_and_s_are_the_cheapest_under_the_bound_of_the_quadrature():
     assert choose(planets, 1e-6) == (8, 7, DEFECTS[8])
     # Trajectories side by side: the product takes four times as long for all.
     assert choose(kepler(1).system, tight, lanes=True) == (8, 7, DEFECTS[8])
+    # A polynomial: longer steps gain more than twelve stages cost, if none of them is exact with fewer.
+    assert choose(problems.load("fput").system, tight, lanes=True) == (12, 11, DEFECTS[12])
+    assert choose(problems.load("henon_heiles").system, loose, lanes=True) == (8, 5, None)
     # A cubic energy is kept exactly, and needs no bound.
     k, s, defect = choose(problems.load("henon_heiles").system, loose)
     assert (k, defect) == (8, None)
