@@ -29,7 +29,7 @@ from hbvm_bench.report.page import DRAWN_CASES, Results, block
 from hbvm_bench.report.problem import ProblemPart, part
 from hbvm_bench.store import archive
 from hbvm_bench.store.records import Record
-from hbvm_bench.summaries import accuracies, goals, laws, needs, outcomes
+from hbvm_bench.summaries import accuracies, compilations, goals, laws, needs, outcomes
 from hbvm_bench.summaries.points import by_family, family_of
 from hbvm_bench.summaries.rows import Task, columns, grouped_by, tasks
 from hbvm_bench.summaries.table import Table
@@ -93,6 +93,13 @@ def goals_reached(results: Results) -> Table | None:
 def times_at_accuracies(results: Results) -> list[Table]:
     """Return the times at several position errors, of each campaign that has any."""
     tables = (accuracies.table(run.index.campaign, run.records) for run in results.runs)
+    return [table for table in tables if table is not None]
+
+
+@block
+def best_compilations(results: Results) -> list[Table]:
+    """Return the best of several compilations beside their median, for all libraries alike."""
+    tables = (compilations.table(run.index.campaign, run.records) for run in results.runs)
     return [table for table in tables if table is not None]
 
 

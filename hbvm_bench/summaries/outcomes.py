@@ -158,7 +158,7 @@ def compilations(records: Sequence[Record]) -> list[str]:
     ratios = sorted(
         (max(times) / min(times), record.case.method)
         for record in records
-        if len(times := _by_compilation(record)) > 1
+        if len(times := by_compilation(record)) > 1
     )
     if not ratios:
         return []
@@ -171,7 +171,7 @@ def compilations(records: Sequence[Record]) -> list[str]:
     ]
 
 
-def _by_compilation(record: Record) -> list[float]:
+def by_compilation(record: Record) -> list[float]:
     """Return the median times of the compilations of a case."""
     samples_of: dict[int, list[float]] = {}
     for round_ in record.timing.rounds if record.timing else ():

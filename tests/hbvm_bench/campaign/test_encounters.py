@@ -10,7 +10,7 @@ from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.campaign.shorter import chosen
 from hbvm_bench.campaign.sweep import fill
 from hbvm_bench.reference import solutions
-from hbvm_bench.summaries import accuracies
+from hbvm_bench.summaries import accuracies, compilations
 from integrators import HBVM, integrate
 from tests.hbvm_bench.made_up_run import record
 
@@ -80,3 +80,27 @@ def test_the_table_of_accuracies_compares_the_fastest_settings_that_are_accurate
         (title, "1e-12", "–", "800 ms", "–"),  # reached by one library alone
     ]
     assert accuracies.table(campaign, []) is None
+
+
+def test_the_best_compilation_stands_beside_the_median_for_all_libraries_alike():
+    campaign = chosen(CAMPAIGN, ["kepler99"])
+    (entry,) = campaign.entries()
+    case = Case(problem=repr(make_problem(entry.use)), method="", grid=campaign.grid)
+
+    def measured(method, times):
+        made = record(
+            replace(case, method=method), times=times, metrics={"position_end": 1e-12, "energy_max": 0.0}
+        )
+        rounds = [replace(one, compilation=place) for place, one in enumerate(made.timing.rounds)]
+        return replace(made, timing=replace(made.timing, rounds=rounds))
+
+    records = [measured("HBVM()", [0.4, 0.2, 0.5]), measured("Taylor()", [0.6, 0.9, 0.6])]
+    table = compilations.table(campaign, records)
+    assert [row[1:] for row in table.rows] == [
+        ("HBVM and Gauss", "HBVM()", "3", "400 ms", "200 ms", "2.50", "1×"),
+        ("Taylor", "Taylor()", "3", "600 ms", "600 ms", "1.50", "3×"),
+    ]
+    once = record(
+        replace(case, method="HBVM()"), times=[0.4], metrics={"position_end": 1e-12, "energy_max": 0.0}
+    )
+    assert compilations.table(campaign, [once]) is None
