@@ -10,15 +10,15 @@ from integrators.kernel.step.sweep import sweep_measured, sweep_to_the_end
 
 
 @compiled
-def test(ctx, strict):
+def test(ctx, moved):
     """Apply the stopping rule to the change of the last sweep; `Solver.outcome` says what came of it."""
     solver, blocks = ctx.solver, ctx.blocks
-    last, solver.last = solver.last, strict
+    last, solver.last = solver.last, moved
     solver.tests += 1
     if blocks.age == 0:
         take_sizes(ctx)
     best, stalled, solver.rate, converged, rest = judge(
-        strict,
+        moved,
         last,
         solver.best,
         solver.stalled,
@@ -27,7 +27,7 @@ def test(ctx, strict):
         solver.tolerance,
         solver.tolerance,
     )
-    if not strict < INFINITY:
+    if not moved < INFINITY:
         # Growing changes overflow in the end; a NaN out of the blue is the field's own.
         restart(ctx, DIVERGED if 1.0 < last < INFINITY else NOT_FINITE)
         return

@@ -2,7 +2,7 @@
 
 The size of a row is that of its block: the coordinates, or the momenta, of one body, else
 the row itself. Rounding of the field may hide a block that is small beside the largest in
-its group, so there are two measures: `strict`, by the block's own size, and `floored`.
+its group, so there are two measures, by `Blocks.weights` and by `Blocks.floored_weights`.
 """
 
 from integrators.kernel.native.jit import compiled, for_both_widths
@@ -92,7 +92,7 @@ def inverse_sizes(size, largest, least, expected, absolute):
 
 
 @compiled
-def invert_sizes(ctx, strict, floored):
+def invert_sizes(ctx, weights, floored_weights):
     """Write the inverse sizes of all rows, by both measures; return whether all blocks have a size."""
     blocks, estimate = ctx.blocks, ctx.estimate
     known = True
@@ -102,7 +102,9 @@ def invert_sizes(ctx, strict, floored):
         expected = estimate.expected[b] if estimate.rescaled else 0.0
         g = blocks.group[b]
         unimportant = max(estimate.absolute[b], blocks.farthest[g])
-        strict[d], floored[d] = inverse_sizes(blocks.size[b], blocks.largest[g], least, expected, unimportant)
+        weights[d], floored_weights[d] = inverse_sizes(
+            blocks.size[b], blocks.largest[g], least, expected, unimportant
+        )
         known = known and blocks.size[b] > SMALLEST
     return known
 

@@ -113,20 +113,20 @@ def iterate(ctx):
     change = first
     trusted, log_trusted = solver.trusted, solver.log_trusted
     while solver.outcome == RUNNING:
-        strict = sweep_measured(ctx, int(untested(change, rate, log_trusted)))
+        moved = sweep_measured(ctx, int(untested(change, rate, log_trusted)))
         tries = solver.tried - tried
-        if strict > ROUNDING:
-            change = binary_log(strict)
+        if moved > ROUNDING:
+            change = binary_log(moved)
             rate = rate_since(first, change, tries)
-        elif strict == 0.0 and tries > 1:
+        elif moved == 0.0 and tries > 1:
             rate = rate_unseen(rate)
         solver.rate = rate
-        test(ctx, strict)
+        test(ctx, moved)
         if solver.tried <= tried:  # started anew
             return settle(ctx)
         if solver.outcome == RUNNING:
-            if strict <= trusted:
-                extra_iterations(ctx, strict)
+            if moved <= trusted:
+                extra_iterations(ctx, moved)
             elif takes_too_long(change, rate, tries, solver.log_rest, BUSY):
                 solver.outcome = DIVERGED  # not yet, but a shorter step is cheaper
                 solver.rate = known
