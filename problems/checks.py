@@ -348,10 +348,19 @@ class Arguments:
             key: value for key, value in self._unchecked.items() if value is not self.parameters[key].default
         }
 
+    @functools.cached_property
+    def _as_given(self) -> int:
+        """So many values by place, and none by name, go to the function as they are; -1: none do."""
+        if self._converted:
+            return -1
+        return next((n for n, key in enumerate(self._by_place) if key not in self._free), len(self._by_place))
+
     def given(
         self, values: Sequence[Any], options: Mapping[str, Any]
     ) -> tuple[Sequence[Any], Mapping[str, Any]]:
         """Return what a call gives by place and by name, checked as by `bind`; Python knows the defaults."""
+        if not options and self._enough <= len(values) <= self._as_given:
+            return values, options
         self.check_names(values, options)
         free, placed, named = self._free, list(values), dict(options)
         for place, key in enumerate(self._by_place[: len(placed)]):

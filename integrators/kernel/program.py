@@ -561,7 +561,7 @@ class AdaptiveProgram(HBVMProgram):
     def begin(self, pair: Pair, y: Array, par: Array, t0: float) -> None:
         """Put what a trajectory from (t0, y) begins with besides into its memory."""
         super().begin(pair, y, par, t0)
-        pair.own.kinks.doubt_end = t0
+        pair.own.kinks.numbers.doubt_end = t0
 
     def _made(self, *, partial: bool) -> Context:
         context = super()._made(partial=True)  # with a matrix of its own

@@ -252,7 +252,7 @@ class HBVMStepper(ABC):
         """Put the trajectory at its start."""
         ctx = self._context
         self._uncounted = ctx.counters.steps  # steps that are not of this trajectory
-        ctx.t0 = t0
+        ctx.numbers.t0 = t0
         for workspace in self._implicit or ():
             workspace.forget()
         steps(engine.RESET, ctx.address, 0, 0, 0, 0, 0, 0, 0, address(y), 0)
@@ -260,8 +260,8 @@ class HBVMStepper(ABC):
     @property
     def t(self) -> float:
         """Time of the last step."""
-        ctx = self._context
-        return ctx.t0 + ctx.n * ctx.h
+        numbers = self._context.numbers
+        return numbers.t0 + numbers.n * numbers.h
 
     @property
     @one_thread
@@ -546,8 +546,9 @@ class HBVMStepper(ABC):
         """Do what the kernel came back for; return whether it may go on, or what it ended with."""
         if self.stop is not None and self.stop.is_set():
             raise KeyboardInterrupt
-        for workspace in (*(self._implicit or ()), *(self._vectors.solvers if self._vectors else ())):
-            workspace.raise_what_is_no_failure()
+        if self._implicit or self._vectors:
+            for workspace in (*(self._implicit or ()), *(self._vectors.solvers if self._vectors else ())):
+                workspace.raise_what_is_no_failure()
         if outcome == HALTED and self.search is not None and self.search.attend():
             return BUDGET
         return outcome

@@ -63,7 +63,7 @@ class AdaptiveStepper(HBVMStepper):
         self._origin = self._goal = t0
         self._in_vain = 1
         super().__init__(program, y, par, t0)
-        if any(map(self._is_at, self._breakpoints.tolist())):
+        if self._breakpoints.size and any(map(self._is_at, self._breakpoints.tolist())):
             self._context.kinks.border = START
 
     def _extra(self) -> dict[str, Any]:

@@ -183,7 +183,9 @@ def integrate(
     if variations is not None:
         directions = follow(stepper, method, problem, variations, sample)
         vectors = [np.empty((0, *directions[0].shape))]
-    t, y, made = [grid[:0]], [np.empty((0, problem.system.dim))], 0
+    t: list[Array] = []
+    y: list[Array] = []
+    made = 0
     lost: Losses = {}
     here, status, reason, before = problem.t0, Status.FINISHED, "", None
     if kept is not None:
@@ -222,7 +224,7 @@ def integrate(
                 if watch.due and samples.t.size and sample != "dense" and not acting:
                     lost = _lost(problem, method, samples, stats.steps) | lost
                 if watch.keeps:
-                    t, y = [np.concatenate(t)], [np.concatenate(y)]
+                    t, y = [_joined(t)], [_joined(y, problem.system.dim)]
                     vectors = None if vectors is None else [np.concatenate(vectors)]
                     lows = None if lows is None else [np.concatenate(lows)]
                     watch.keep(
@@ -259,7 +261,7 @@ def integrate(
     reached = _joined(t)
     solution = solution_of(
         t=reached,
-        y=_joined(y),
+        y=_joined(y, problem.system.dim),
         events={},
         variations=None if vectors is None else np.concatenate(vectors),
         directions=directions,
@@ -355,9 +357,11 @@ def _next_piece(
     return grid[made : made + count], sample, count
 
 
-def _joined(parts: list[Array]) -> Array:
-    """Return the pieces as one array of its own."""
-    return parts[1].copy() if len(parts) == 2 and not len(parts[0]) else np.concatenate(parts)
+def _joined(parts: list[Array], *row: int) -> Array:
+    """Return pieces, whose rows have this shape, as one array of its own."""
+    if len(parts) == 1:
+        return parts[0].copy()
+    return np.concatenate(parts) if parts else np.empty((0, *row))
 
 
 def _growth(seconds: float) -> float:
