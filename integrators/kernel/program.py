@@ -343,11 +343,13 @@ class HBVMProgram(Compiled):
         if pair is None:
             pair = Pair(*self.contexts())
             self._put(pair.own, pair.partial, par)
-        elif not pair.renew(key := par.tobytes()):
+            return pair
+        if not pair.renew():
             pair.own.become(self._context(partial=False))
             pair.partial.become(self._context(partial=True))
             if self.kept:
                 self.kept.share(pair.own, pair.partial)
+        if pair.par != (key := par.tobytes()):
             self._put(pair.own, pair.partial, par)
             pair.keep(key)
         return pair

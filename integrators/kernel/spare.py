@@ -19,8 +19,8 @@ class Pair:
         Fresh ones.
     """
 
-    par = b""
-    """The parameters of `_content`; they say nothing while there is none."""
+    par: bytes | None = None
+    """The parameters of what is kept."""
     _content: tuple[Content, Content] | None = None
 
     def __init__(self, own: Context, partial: Context):
@@ -31,9 +31,9 @@ class Pair:
         """Take what both hold for what a trajectory with these parameters begins with."""
         self.par, self._content = par, (self.own.content(), self.partial.content())
 
-    def renew(self, par: bytes) -> bool:
-        """Let both hold what a trajectory with these parameters begins with; False if that is not known."""
-        if self._content is None or self.par != par:
+    def renew(self) -> bool:
+        """Let both hold what a trajectory with ``par`` begins with; False if nothing is kept."""
+        if self._content is None:
             return False
         self.own.renew(self._content[0])
         if self.partial.repointed:  # otherwise nothing depends on what the last partial step left there
