@@ -118,10 +118,10 @@ def lost_invariants(
     steps : ndarray of int, shape (n,)
         Steps taken.
     """
-    found: list[Losses] = [{} for _ in par]
+    losses: list[Losses] = [{} for _ in par]
     promised = [name for name in conserved if not any(r.flags & T for r in system.invariants[name].roots)]
     if not promised or not times.size:
-        return found
+        return losses
     every = -(-states.shape[1] // max(1, LOOKED_AT // len(par)))
     times = np.broadcast_to(times, states.shape[:2])[:, ::-1][:, ::every][:, ::-1].reshape(-1)
     states = states[:, ::-1][:, ::every][:, ::-1]
@@ -149,8 +149,8 @@ def lost_invariants(
                 lost = lost[change[lost] > limit[lost] * size[lost]]
         for i in lost[::-1]:
             loss = float(times[i]), float(change[i]), float(size[i])
-            found[owner[i]][name] = loss
-    return found
+            losses[owner[i]][name] = loss
+    return losses
 
 
 def of_losses(losses: Losses) -> tuple[str, ...]:

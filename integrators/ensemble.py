@@ -101,9 +101,9 @@ class Solutions(Trajectories):
             For a number that none of them has.
         """
         numbers = np.arange(len(self))[which]
-        return self._one(int(numbers)) if np.ndim(numbers) == 0 else self._some(numbers)
+        return self._single(int(numbers)) if np.ndim(numbers) == 0 else self._some(numbers)
 
-    def _one(self, i: int) -> Solution:
+    def _single(self, i: int) -> Solution:
         times, system = self._times[i], self.problem.system
         there = np.isfinite(times) & ~np.isnan(self.y[i]).any(axis=1)
         asked = times[np.isfinite(times)]
@@ -180,7 +180,7 @@ class Solutions(Trajectories):
         """Of each trajectory, the sentences that `integrators.Solution.warnings` would have."""
         problem = self.problem
         caveat, conserved = self.method.caveat(problem), self.method.conserved(problem.system)
-        if any(found.after is not None for one in self.events for found in one.values()):
+        if any(occurrences.after is not None for events in self.events for occurrences in events.values()):
             conserved = {}  # the events' actions may change it
         lost = lost_invariants(
             problem.system, conserved, self.starts, self._times, self.y, self.par, self.steps
@@ -214,7 +214,7 @@ class Solutions(Trajectories):
         )
 
     def _gathered(self, members: list[dict[str, Array]]) -> dict[str, Array]:
-        return {name: np.stack([one[name] for one in members]) for name in members[0]}
+        return {name: np.stack([member[name] for member in members]) for name in members[0]}
 
     def __repr__(self) -> str:
         return printable(
@@ -244,10 +244,12 @@ class Solutions(Trajectories):
         )
         lines += self._largest()
         if self.events:
-            found = Counter({name: len(hits) for one in self.events for name, hits in one.items()})
-            for one in self.events[1:]:
-                found.update(dict.fromkeys(one, 0))
-            totals = {name: sum(len(one[name]) for one in self.events if name in one) for name in found}
+            counter = Counter({name: len(hits) for events in self.events for name, hits in events.items()})
+            for events in self.events[1:]:
+                counter.update(dict.fromkeys(events, 0))
+            totals = {
+                name: sum(len(events[name]) for events in self.events if name in events) for name in counter
+            }
             lines.append("events found: " + ", ".join(f"{name} {n}" for name, n in totals.items()))
         if self.reduced:
             lines.append("reduced: " + ", ".join(f"{k} {np.shape(v)}" for k, v in self.reduced.items()))
@@ -318,14 +320,14 @@ class Solutions(Trajectories):
             For a method that is not registered, or a file that cannot be written.
         """
         arrays: dict[str, NDArray[Any]] = {name: getattr(self, name) for name in _ARRAYS}
-        names = sorted({name for one in self.events for name in one})
+        names = sorted({name for events in self.events for name in events})
         for name in names:
-            found = [one.get(name) for one in self.events]
-            lengths = np.array([0 if hits is None else len(hits) for hits in found], dtype=np.int64)
+            occurrences = [events.get(name) for events in self.events]
+            lengths = np.array([0 if hits is None else len(hits) for hits in occurrences], dtype=np.int64)
             arrays[f"event_counts:{name}"] = lengths
-            acts = any(hits is not None and hits.after is not None for hits in found)
+            acts = any(hits is not None and hits.after is not None for hits in occurrences)
             for key in ("t", "y", "direction", *(["after"] if acts else [])):
-                parts = [getattr(hits, key) for hits in found if hits is not None]
+                parts = [getattr(hits, key) for hits in occurrences if hits is not None]
                 arrays[f"event_{key}:{name}"] = np.concatenate(parts)
         if self.variations is not None and self.directions is not None:
             arrays["variations"] = self.variations
@@ -389,8 +391,8 @@ def _from_file(words: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]], pro
         raise TypeError("its parts belong to other numbers of trajectories")
     steps = doubles(arrays["steps"], (n,), "steps")
     extra = {int(i): of_type(dict, value) for i, value in unpacked(words["extra"], arrays).items()}
-    for one in extra.values():
-        solution.check_extra(one)
+    for values in extra.values():
+        solution.check_extra(values)
     return Solutions(
         t=doubles(t, (m,) if np.ndim(t) == 1 else (n, m), "t"),
         y=doubles(arrays["y"], (n, m, dim), "y"),
@@ -434,7 +436,7 @@ def _numbers(values: NDArray[Any]) -> NDArray[Any]:
 def _events(
     names: list[str], arrays: Mapping[str, NDArray[Any]], n: int, dim: int
 ) -> list[dict[str, Occurrences]]:
-    found: list[dict[str, Occurrences]] = [{} for _ in range(n)]
+    events: list[dict[str, Occurrences]] = [{} for _ in range(n)]
     for name in names:
         counts = arrays[f"event_counts:{name}"]
         if counts.dtype.kind != "i" or counts.shape != (n,) or counts.min(initial=0) < 0:
@@ -445,7 +447,7 @@ def _events(
         ends = np.cumsum(counts)
         for i, (low, high) in enumerate(zip(ends - counts, ends, strict=True)):
             after = None if whole.after is None else whole.after[low:high]
-            found[i][name] = Occurrences(
+            events[i][name] = Occurrences(
                 whole.t[low:high], whole.y[low:high], whole.direction[low:high], after
             )
-    return found
+    return events

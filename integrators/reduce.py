@@ -158,51 +158,51 @@ class _Sum:
 @dataclass
 class _Extreme:
     better: Callable[..., Any]
-    found: Any = np.nan
+    collected: Any = np.nan
 
     def take(self, values: Array) -> None:
-        self.found = self.better(self.found, self.better.reduce(values, axis=0))  # pyright: ignore[reportFunctionMemberAccess]
+        self.collected = self.better(self.collected, self.better.reduce(values, axis=0))  # pyright: ignore[reportFunctionMemberAccess]
 
     def result(self) -> Array:
-        return np.asarray(self.found, dtype=np.float64)
+        return np.asarray(self.collected, dtype=np.float64)
 
 
 @dataclass
 class _Counts:
     edges: Array
-    found: Any = 0
+    collected: Any = 0
 
     def take(self, values: Array) -> None:
-        self.found = self.found + _counted(values.T, self.edges)
+        self.collected = self.collected + _counted(values.T, self.edges)
 
     def result(self) -> Array:
-        return np.asarray(self.found)
+        return np.asarray(self.collected)
 
 
 @dataclass
 class _Rows:
     of_row: Callable[..., Any]
-    found: list[Array] = field(default_factory=list)
+    collected: list[Array] = field(default_factory=list)
 
     def take(self, values: Array) -> None:
         with warnings.catch_warnings():  # that a trajectory reached nothing: its result is NaN
             warnings.simplefilter("ignore", RuntimeWarning)
-            self.found.append(self.of_row(values, axis=1))
+            self.collected.append(self.of_row(values, axis=1))
 
     def result(self) -> Array:
-        return np.concatenate(self.found)
+        return np.concatenate(self.collected)
 
 
 @dataclass
 class _CountedRows:
     edges: Array
-    found: list[Array] = field(default_factory=list)
+    collected: list[Array] = field(default_factory=list)
 
     def take(self, values: Array) -> None:
-        self.found.append(_counted(values, self.edges))
+        self.collected.append(_counted(values, self.edges))
 
     def result(self) -> Array:
-        return np.concatenate(self.found)
+        return np.concatenate(self.collected)
 
 
 def _counted(rows: Array, edges: Array) -> Array:
@@ -256,10 +256,10 @@ class Reducer:
         """Return what each amounts to, of n trajectories; nothing if none was taken."""
         if not self.numbers:
             return {}
-        found = {name: gathering.result() for name, gathering in self.gathered.items()}
+        results = {name: gathering.result() for name, gathering in self.gathered.items()}
         order = np.concatenate(self.numbers)
         for name in self._over_times:
-            values = found[name]
-            found[name] = np.full((n, *values.shape[1:]), np.nan if values.dtype.kind == "f" else 0)
-            found[name][order] = values
-        return found
+            values = results[name]
+            results[name] = np.full((n, *values.shape[1:]), np.nan if values.dtype.kind == "f" else 0)
+            results[name][order] = values
+        return results

@@ -70,12 +70,12 @@ def check_times(times: ArrayLike, t: float) -> Array:
     )
 
 
-def as_numbers(what: str, value: ArrayLike) -> Array:
+def as_numbers(label: str, value: ArrayLike) -> Array:
     """Return an array of float64, or refuse what is not made of numbers."""
     try:
         return np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{what} must be numbers, not {shown(value)}.") from None
+        raise InputError(f"{label} must be numbers, not {shown(value)}.") from None
 
 
 def check_start(t0: Any) -> float:

@@ -78,13 +78,13 @@ def _entries() -> "dict[str, list[EntryPoint]]":
     """Return what offers each name: one entry point, or several that clash, which only this name minds."""
     from importlib.metadata import EntryPoint, entry_points  # a tenth of what importing us would take
 
-    found = {
+    by_name = {
         name: [EntryPoint(name, f"{module}:{name}", GROUP)]
         for module, own in BUILT_IN.items()
         for name in own
     }
     for entry in entry_points(group=GROUP):
-        same = found.setdefault(entry.name, [])
+        same = by_name.setdefault(entry.name, [])
         if entry.value not in [other.value for other in same]:
             same.append(entry)
-    return found
+    return by_name

@@ -238,7 +238,7 @@ class Solution:
             raise InputError(
                 f"t={wrong!r} is not between t = {float(at[0])!r} and {end!r}, which the solution covers."
             )
-        found = np.empty((wanted.size, states.shape[1]))
+        states_ = np.empty((wanted.size, states.shape[1]))
         sample = np.searchsorted(sign * at, wanted, side="right") - 1
         close = max(ROUNDING, self.method.options(defaults=True).get("tol") or 0.0) * np.abs(
             states[:, :dim]
@@ -276,12 +276,12 @@ class Solution:
             )
             done = group.size if met.all() else int(np.argmin(met))
             mine = mine[sample[mine] <= group[done - 1]]
-            found[mine] = reached[np.searchsorted(goals, wanted[mine])]
+            states_[mine] = reached[np.searchsorted(goals, wanted[mine])]
             first += done
             count = min(2 * count, MOST_AT_ONCE) if done == group.size else done
         own = wanted == sign * at[sample]
-        found[own] = states[sample[own]]
-        return found[places.reshape(times.shape)]
+        states_[own] = states[sample[own]]
+        return states_[places.reshape(times.shape)]
 
     def _begun(self, row: Array, t: float) -> Any:
         """Return a stepper at a state, which may have low parts behind it."""
@@ -293,13 +293,17 @@ class Solution:
 
     def _with_actions(self, at: Array, states: Array) -> tuple[Array, Array]:
         """Return samples, and the states that events' actions have made in between, in order."""
-        acted = [found for found in self.events.values() if found.after is not None and found.t.size]
+        acted = [
+            happened for happened in self.events.values() if happened.after is not None and happened.t.size
+        ]
         if not acted:
             return at, states
         sign = 1.0 if self.t_stop >= self.problem.t0 else -1.0
         # At one time the sample counts, or else the state that the last of the events has made.
-        t = np.concatenate([at, *(found.t for found in acted[::-1])])
-        y = np.concatenate([states, *(found.after for found in acted[::-1] if found.after is not None)])
+        t = np.concatenate([at, *(happened.t for happened in acted[::-1])])
+        y = np.concatenate(
+            [states, *(happened.after for happened in acted[::-1] if happened.after is not None)]
+        )
         _, places = np.unique(sign * t, return_index=True)
         return t[places], y[places]
 
@@ -335,7 +339,7 @@ class Solution:
         said = warnings(problem, problem.y0, problem.par, end, self.method.caveat(problem), extra)
         if failure := extra.get("checkpoint"):
             said = (*said, failure)
-        acted = any(found.after is not None for found in self.events.values())
+        acted = any(happened.after is not None for happened in self.events.values())
         conserved = {} if acted or extra.get("sample") == "dense" else self.method.conserved(problem.system)
         lost = lost_invariants(
             problem.system, conserved, problem.y0[None], self.t, self.y[None], problem.par[None],
@@ -412,7 +416,7 @@ class Solution:
     def __str__(self) -> str:
         lines = [str(self.problem), self._with(), self._cost(), *self._kept()]
         if self.events:
-            counts = ", ".join(f"{name} {len(found)}" for name, found in self.events.items())
+            counts = ", ".join(f"{name} {len(happened)}" for name, happened in self.events.items())
             lines.append(f"events found: {counts}")
         lines += [f"warning: {sentence}" for sentence in self.warnings]
         return printable("\n".join(lines))  # a file that was loaded may hold any text
@@ -503,9 +507,9 @@ class Solution:
             arrays["directions_state"], arrays["directions_parameters"] = self.directions
         if self.low is not None and self.start is not None:
             arrays |= {"low": self.low, "start": self.start}
-        for name, found in self.events.items():
+        for name, happened in self.events.items():
             arrays |= {
-                f"event_{key}:{name}": value for key, value in vars(found).items() if value is not None
+                f"event_{key}:{name}": value for key, value in vars(happened).items() if value is not None
             }
         words = {
             "format": FORMAT,
@@ -543,13 +547,13 @@ def read_file(path: Any, problem: Any, readers: Mapping[str | None, Any]) -> Any
         words = json.loads(arrays["words"].tobytes())
         if words["format"] != FORMAT:
             raise InputError(f"{path} is of format {words['format']}, which this version does not read.")
-        found = unpacked_problem(words["problem"], arrays) or problem
-        if found is None:
+        problem_ = unpacked_problem(words["problem"], arrays) or problem
+        if problem_ is None:
             raise InputError(
                 f"the field of the solution in {path} is code, which the file does not hold; "
                 "load it with problem=, the one that was integrated."
             )
-        return readers[words.get("kind")](words, arrays, found)
+        return readers[words.get("kind")](words, arrays, problem_)
     except (InputError, FileNotFoundError) as error:
         if isinstance(error, InputError):
             raise
@@ -563,10 +567,10 @@ def read_file(path: Any, problem: Any, readers: Mapping[str | None, Any]) -> Any
 
 
 if TYPE_CHECKING:
-    made = Solution
+    solution_of = Solution
 else:
 
-    def made(**fields: Any) -> Solution:
+    def solution_of(**fields: Any) -> Solution:
         """Return ``Solution(**fields)``, given all of them; a frozen class sets each by a call."""
         solution = object.__new__(Solution)
         vars(solution).update(fields)

@@ -90,7 +90,7 @@ class StepperBase:
     """A trajectory; satisfies `integrators.protocol.Stepper`.
 
     A subclass states its ``samplings`` (the default first) and implements
-    `_serve`, `_step_states` and `_one`. One with checkpoints is a `RestorableStepper`.
+    `_serve`, `_step_states` and `_one_step`. One with checkpoints is a `RestorableStepper`.
 
     The *present* time ``t`` and state ``y`` are those last returned. The library
     itself may be ahead of them (an adaptive method, whose steps are not
@@ -144,7 +144,7 @@ class StepperBase:
     def step(self) -> Status:
         """Take one step of the method's own length; after a failure, do nothing."""
         if self._status is Status.RUNNING:
-            reached = self._one()
+            reached = self._one_step()
             if reached is not None and self._finite(*reached):
                 self._arrive(*reached)
         return self._status
@@ -217,7 +217,7 @@ class StepperBase:
         """Return the steps from the present (excluded) to ``end`` (included), as `_serve` does."""
         raise NotImplementedError
 
-    def _one(self) -> tuple[float, Array] | None:
+    def _one_step(self) -> tuple[float, Array] | None:
         """Take one step and return where it arrived; ``None`` after a failure."""
         raise NotImplementedError
 
@@ -229,7 +229,7 @@ class RestorableStepper(StepperBase):
     def identity(self) -> Identity:
         """What its checkpoints belong to."""
         program, par = self.started
-        return Identity.of(repr(program.method), program.system, par)
+        return Identity.from_system(repr(program.method), program.system, par)
 
     @one_thread
     def checkpoint(self) -> Checkpoint:
@@ -352,7 +352,7 @@ class FixedStepper(RestorableStepper):
                 return times[: i + 1], states[: i + 1]
         return times, states
 
-    def _one(self) -> tuple[float, Array]:
+    def _one_step(self) -> tuple[float, Array]:
         self._go(self._n + 1)
         return self._time(), self._state()
 

@@ -124,9 +124,9 @@ def mean(t: ArrayLike, errors: ArrayLike) -> Law:
     value, n = float(np.mean(ends)), ends.size
     error = math.sqrt(float(np.sum((ends - value) ** 2)) / (n * (n - 1))) if n > 1 else math.inf
     span = float(times[-1] - times[first].mean())
-    rate, low, high = (_finite(one / span) for one in (value, *_interval(value, error, n)))
-    found = Law(mean=value, mean_error=_finite(error), positive=int(np.sum(ends > 0.0)), starts=n)
-    return replace(found, rate=rate, rate_low=low, rate_high=high, end=float(times[-1]))
+    rate, low, high = (_finite(bound / span) for bound in (value, *_interval(value, error, n)))
+    mean_law = Law(mean=value, mean_error=_finite(error), positive=int(np.sum(ends > 0.0)), starts=n)
+    return replace(mean_law, rate=rate, rate_low=low, rate_high=high, end=float(times[-1]))
 
 
 def fit(t: ArrayLike, errors: ArrayLike, *, signed: bool = True) -> Law:
@@ -161,13 +161,13 @@ def fit(t: ArrayLike, errors: ArrayLike, *, signed: bool = True) -> Law:
     if size < 2:
         return Law(why="the error is not finite from the first samples on", starts=len(rows))
     times, rows = times[:size], rows[:, :size]
-    found = mean(times, rows) if signed else Law(end=float(times[-1]), starts=len(rows))
+    fitted = mean(times, rows) if signed else Law(end=float(times[-1]), starts=len(rows))
     if size < good.size:
-        found = replace(found, why=f"only to t = {times[-1]:.4g}, where the error is last finite")
+        fitted = replace(fitted, why=f"only to t = {times[-1]:.4g}, where the error is last finite")
     middle, label = _windows(times)
     values = _windowed(rows, label)
     if not np.any(values):
-        return replace(found, law="bounded", slope=0.0, slope_low=0.0, slope_high=0.0)
+        return replace(fitted, law="bounded", slope=0.0, slope_low=0.0, slope_high=0.0)
     kept = values > 0.0
     decades = math.log10(times[-1] / times[0])
     if kept.sum() < FEWEST_WINDOWS or decades < SHORTEST:
@@ -175,17 +175,17 @@ def fit(t: ArrayLike, errors: ArrayLike, *, signed: bool = True) -> Law:
             f"a fit of the error growth needs samples in {FEWEST_WINDOWS} windows over {SHORTEST} decades "
             "of time"
         )
-        return replace(found, why=why, floor=float(values[kept].min()))
+        return replace(fitted, why=why, floor=float(values[kept].min()))
     fits = {law: _fitted(law, middle[kept], values[kept]) for law in CURVES}
     slope, low, high = _slope(times, rows, fits["power"])
     law = min(CURVES, key=lambda name: fits[name].score)
     if fits[law].score > fits["bounded"].score - EVIDENCE or fits[law].above < FEWEST_ABOVE:
         law = "bounded"
-    if drifts(found) and law == "power":
+    if drifts(fitted) and law == "power":
         fits["drift"], law = fits["power"], "drift"
     floor = math.exp(fits[law].parameters[0])
     return replace(
-        found,
+        fitted,
         law=law,
         slope=slope,
         slope_low=_finite(low),
@@ -228,15 +228,15 @@ def _fitted(law: str, t: Array, values: Array) -> _Fit:
     steep = (0.5, 1.5) if law == "power" else (2.0, 20.0)
     guesses = [[*guess, value] for guess in guesses for value in steep]
     lower, upper = (np.array(side) for side in zip(*bounds, strict=True))
-    found = min(
+    best = min(
         (least_squares(residual, np.clip(g, lower, upper), bounds=(lower, upper)) for g in guesses),
-        key=lambda one: one.cost,
+        key=lambda candidate: candidate.cost,
     )
-    parameters = found.x.tolist()
-    normal = found.jac.T @ found.jac + 1e-12 * np.eye(found.x.size)
-    variance = max(2.0 * found.cost / max(n - found.x.size, 1), NOISE**2) * np.linalg.inv(normal)[-1, -1]
-    above = int(np.sum(grown(found.x) > found.x[0]))
-    score = _score(residual(found.x), found.x.size)
+    parameters = best.x.tolist()
+    normal = best.jac.T @ best.jac + 1e-12 * np.eye(best.x.size)
+    variance = max(2.0 * best.cost / max(n - best.x.size, 1), NOISE**2) * np.linalg.inv(normal)[-1, -1]
+    above = int(np.sum(grown(best.x) > best.x[0]))
+    score = _score(residual(best.x), best.x.size)
     return _Fit(tuple(parameters), score, math.sqrt(max(variance, 0.0)), above)
 
 

@@ -200,7 +200,7 @@ def file_from(
     problem: Problem,
     times: Array,
     states: list[list[str]],
-    made: dict[str, str],
+    provenance: dict[str, str],
     condition: Array | None = None,
 ) -> ReferenceFile:
     """Return the reference of a problem: states as text at some times, how made, and their condition."""
@@ -208,7 +208,8 @@ def file_from(
         problem=repr(problem),
         start=start(problem),
         parameters=hexadecimal(problem.par),
-        provenance=made | {"field": emit.fingerprint(problem.system), "t_end": repr(float(problem.t_end))},
+        provenance=provenance
+        | {"field": emit.fingerprint(problem.system), "t_end": repr(float(problem.t_end))},
         t=hexadecimal(times),
         y=states,
         condition=[] if condition is None else [float(f"{value:.2g}") for value in condition.tolist()],

@@ -21,24 +21,26 @@ def table(campaign: Campaign, records: Sequence[Record]) -> Table | None:
     """
     rows = []
     for entry, here in standings.entries(campaign, records):
-        libraries = {OURS: standings.among(here, "")} | by_family([one for one in here if one.role != "ours"])
+        libraries = {OURS: standings.among(here, "")} | by_family(
+            [setting for setting in here if setting.role != "ours"]
+        )
         fastest = {name: standings.best(those, entry.within) for name, those in libraries.items()}
-        times = {name: by_compilation(one) for name, one in fastest.items() if one is not None}
+        times = {name: by_compilation(setting) for name, setting in fastest.items() if setting is not None}
         ours = min(times.get(OURS, []), default=None)
-        for name, made in times.items():
-            if len(made) < 2:
+        for name, table_rows in times.items():
+            if len(table_rows) < 2:
                 continue
             record = fastest[name]
-            best = min(made)
+            best = min(table_rows)
             rows.append(
                 (
                     standings.title_of(entry),
                     name,
                     NONE if record is None else record.case.method,
-                    f"{len(made)}",
-                    seconds(median(made)),
+                    f"{len(table_rows)}",
+                    seconds(median(table_rows)),
                     seconds(best),
-                    f"{max(made) / best:.2f}",
+                    f"{max(table_rows) / best:.2f}",
                     NONE if ours is None else f"{best / ours:.3g}×",
                 )
             )

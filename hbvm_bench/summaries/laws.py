@@ -38,26 +38,26 @@ def clear(law: Law) -> Law:
 
 def by_method(records: Sequence[Record]) -> dict[str, list[Law]]:
     """Return for each family the laws of the energy of its cases on their trajectory."""
-    found = [one for one in records if "energy" in one.result.laws and reached(one)]
+    judged = [record for record in records if "energy" in record.result.laws and reached(record)]
     return {
-        family: [clear(one.result.laws["energy"]) for one in each]
-        for family, each in by_family(found).items()
+        family: [clear(record.result.laws["energy"]) for record in each]
+        for family, each in by_family(judged).items()
     }
 
 
 def table(records: Sequence[Record]) -> Table | None:
     """Return how many cases of each method follow which law; ``None`` where no law was sought."""
-    found = by_method(records)
-    if not found:
+    laws_of = by_method(records)
+    if not laws_of:
         return None
     kinds = [*dict.fromkeys(SHORT.values()), NOT_CLEAR]
     rows = []
-    for family, laws in found.items():
+    for family, laws in laws_of.items():
         counted = Counter(SHORT[law.law] if law.law else NOT_CLEAR for law in laws)
         powers = sorted(law.slope for law in laws if law.slope is not None and law.law == "power")
         middle = f"{median(powers):.2f} ({powers[0]:.2f} to {powers[-1]:.2f})" if powers else NONE
         rows.append((family, *(str(counted.get(kind, NONE)) for kind in kinds), middle))
-    starts = max(law.starts for laws in found.values() for law in laws)
+    starts = max(law.starts for laws in laws_of.values() for law in laws)
     return Table(
         "Growth of the energy error",
         ("method", *kinds, "a"),

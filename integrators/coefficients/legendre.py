@@ -52,7 +52,7 @@ class Table:
     lo: Array
 
     @classmethod
-    def of(cls, numbers: Any, shape: tuple[int, ...]) -> "Table":
+    def rounded(cls, numbers: Any, shape: tuple[int, ...]) -> "Table":
         """Round a flat sequence of mpmath numbers to a table of the given shape."""
         hi = [float(x) for x in numbers]
         lo = [float(x - _mp.mpf(top)) for x, top in zip(numbers, hi, strict=True)]
@@ -185,14 +185,14 @@ def tables(k: int, s: int) -> Tables:
     return Tables(
         k=k,
         s=s,
-        nodes=Table.of(nodes, (k,)),
-        weights=Table.of(weights, (k,)),
-        basis=Table.of([v for row in basis for v in row[:s]], (k, s)),
-        integrals=Table.of([v for row in integrals for v in row], (k, s)),
-        projection=Table.of(projection, (s, k)),
-        x=Table.of([v for row in x for v in row], (s, s)),
-        double_integrals=Table.of([v for row in double_integrals for v in row], (k, s)),
-        position_weights=Table.of(position_weights, (k,)),
+        nodes=Table.rounded(nodes, (k,)),
+        weights=Table.rounded(weights, (k,)),
+        basis=Table.rounded([v for row in basis for v in row[:s]], (k, s)),
+        integrals=Table.rounded([v for row in integrals for v in row], (k, s)),
+        projection=Table.rounded(projection, (s, k)),
+        x=Table.rounded([v for row in x for v in row], (s, s)),
+        double_integrals=Table.rounded([v for row in double_integrals for v in row], (k, s)),
+        position_weights=Table.rounded(position_weights, (k,)),
     )
 
 
@@ -212,8 +212,8 @@ def beyond_two(k: int, modes: int) -> Array:
         return _mp.matrix([polynomials(c, modes, xis.__getitem__) for c in points])
 
     known = at([c / 2 for c in nodes] + [(1 + c) / 2 for c in nodes])
-    found = at([1 + c / 2 for c in nodes]) * _mp.inverse(known.T * known) * known.T
-    return np.array(found.tolist(), dtype=np.float64)
+    matrix = at([1 + c / 2 for c in nodes]) * _mp.inverse(known.T * known) * known.T
+    return np.array(matrix.tolist(), dtype=np.float64)
 
 
 def _xis(s: int) -> list[Any]:
@@ -240,7 +240,7 @@ def _gauss(k: int) -> tuple[list[Any], list[Any]]:
     close to 0 are formed as (1 - x)/2 with 50 digits, so their doubles are as
     relatively exact as all others.
     """
-    one = _mp.mpf(1)
+    unity = _mp.mpf(1)
     lower, lower_weights = [], []
     for guess in np.polynomial.legendre.leggauss(k)[0][(k + 1) // 2 :]:
         x = _mp.mpf(float(guess))
@@ -248,13 +248,13 @@ def _gauss(k: int) -> tuple[list[Any], list[Any]]:
             value, slope = _legendre_and_slope(x, k)
             x -= value / slope
         slope = _legendre_and_slope(x, k)[1]
-        lower.append((one - x) / 2)
-        lower_weights.append(one / ((one - x * x) * slope * slope))
+        lower.append((unity - x) / 2)
+        lower_weights.append(unity / ((unity - x * x) * slope * slope))
     middle, middle_weight = [], []
     if k % 2:
         slope = _legendre_and_slope(_mp.mpf(0), k)[1]
-        middle, middle_weight = [one / 2], [one / (slope * slope)]
-    nodes = lower[::-1] + middle + [one - c for c in lower]
+        middle, middle_weight = [unity / 2], [unity / (slope * slope)]
+    nodes = lower[::-1] + middle + [unity - c for c in lower]
     return nodes, lower_weights[::-1] + middle_weight + lower_weights
 
 

@@ -61,8 +61,8 @@ def order_of(method: Tableau | MethodBase) -> int:
     >>> order_of(HBVM(k=6, s=3, h=0.1))
     6
     """
-    found = _tableau(method)
-    A, b, c = found.A, found.b, found.c
+    tableau_ = _tableau(method)
+    A, b, c = tableau_.A, tableau_.b, tableau_.c
     most = 2 * b.size  # of all Runge-Kutta methods with as many stages
     P = legendre(c, most + 1)
     integrals = legendre_integrals(c, most + 1)

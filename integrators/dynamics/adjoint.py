@@ -106,14 +106,14 @@ def gradient(
         raise InputError(f"loss={shown(loss)} must be a function of the end, such as lambda q: q[0] ** 2.")
     if not system.traced:
         raise InputError(f"gradients of {system.name} need a formula; its field is code.")
-    found = places(problem)
+    slices = places(problem)
     names = [wrt] if isinstance(wrt, str) else list(wrt)
     for name in names:
-        if name not in (START, TIME, *found):
-            raise unknown("variable of gradients", name, (START, TIME, *found))
+        if name not in (START, TIME, *slices):
+            raise unknown("variable of gradients", name, (START, TIME, *slices))
     grid, rows = _samples(problem, t_end, times, data)
     function = system.trace(loss, "loss", data=None if data is None else rows.shape[1:])
-    inner = any(name in found for name in names)
+    inner = any(name in slices for name in names)
     program, _ = prepared(method, system)
     recorded = Recorded(program, problem, grid, memory=memory)
     par = [np.concatenate([problem.par, row.reshape(-1)]) for row in rows]
@@ -130,7 +130,7 @@ def gradient(
         elif name == TIME:
             grads[name] = -back @ emit.numpy(system, "field")(problem.t0, problem.y0, problem.par)
         else:
-            grads[name] = by_par[found[name]].reshape(np.shape(system.parameters[name]))
+            grads[name] = by_par[slices[name]].reshape(np.shape(system.parameters[name]))
     return value, {name: np.asarray(each) for name, each in grads.items()}
 
 

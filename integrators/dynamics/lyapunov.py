@@ -109,13 +109,13 @@ def lyapunov(
     stepper = with_variations(problem, method)
     frame, none = _frame(system.dim, system.dof)[:, :n], np.zeros((system.n_par, n))
     stepper.follow(frame, none)
-    times, growth, made = [], [], None
+    times, growth, samples = [], [], None
     rounds = np.linspace(problem.t0, end, ROUNDS + 1)[1:]
     for t in rounds.tolist():
-        made = stepper.advance([t], sample="steps")
-        if made.status is not Status.FINISHED:
+        samples = stepper.advance([t], sample="steps")
+        if samples.status is not Status.FINISHED:
             break
-        if not made.t.size:
+        if not samples.t.size:
             continue
         frame, triangle = np.linalg.qr(stepper.variations[-1])
         sizes = np.abs(np.diag(triangle))
@@ -124,12 +124,12 @@ def lyapunov(
         stepper.follow(frame, none)
         times.append(stepper.t)
         growth.append(np.log(sizes))
-    assert made is not None
+    assert samples is not None
     if np.count_nonzero(np.array(times) >= problem.t0 + skip) <= 2 * WAVES:
-        why = made.reason or "give a later t_end or shorter steps."
+        why = samples.reason or "give a later t_end or shorter steps."
         raise InputError(f"there are too few steps after skip={skip!r} for intervals: {why}")
     canonical = system.dof is not None and n == system.dim
-    return _averaged(problem.t0 + skip, np.array(times), np.array(growth), canonical, made)
+    return _averaged(problem.t0 + skip, np.array(times), np.array(growth), canonical, samples)
 
 
 def _frame(dim: int, dof: int | None) -> Array:
@@ -143,7 +143,7 @@ def _frame(dim: int, dof: int | None) -> Array:
     return np.concatenate([first, second[:, ::-1]], axis=1)
 
 
-def _averaged(start: float, times: Array, growth: Array, canonical: bool, made: Samples) -> Exponents:
+def _averaged(start: float, times: Array, growth: Array, canonical: bool, samples: Samples) -> Exponents:
     """Return exponents and intervals from what the vectors have grown by, up to each of some times."""
     first = int(np.searchsorted(times, start))
     grown, ends = np.cumsum(growth, axis=0)[first:], times[first:]
@@ -158,4 +158,6 @@ def _averaged(start: float, times: Array, growth: Array, canonical: bool, made: 
     order = np.argsort(-exponents)
     exponents, half = exponents[order], half[order]
     intervals = np.stack([exponents - half, exponents + half], axis=1)
-    return Exponents(exponents, intervals, float(exponents.sum()), pairs, time, made.status, made.reason)
+    return Exponents(
+        exponents, intervals, float(exponents.sum()), pairs, time, samples.status, samples.reason
+    )

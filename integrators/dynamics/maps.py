@@ -165,14 +165,14 @@ def indicator_map(
                 while (first := state["made"]) < n:
                     count = threads if first else 1  # the first compiles what all need
                     here = slice(first, first + count)
-                    found = list(pool.map(value, rows[here], par[here]))
+                    results = list(pool.map(value, rows[here], par[here]))
                     state["values"][here] = [
-                        each.value if not each.status.failed else np.nan for each in found
+                        each.value if not each.status.failed else np.nan for each in results
                     ]
-                    state["status"][here] = [each.status for each in found]
-                    state["reason"][here] = [each.reason for each in found]
-                    state["made"] = first + len(found)
-                    state["steps"] += sum(each.steps for each in found)
+                    state["status"][here] = [each.status for each in results]
+                    state["reason"][here] = [each.reason for each in results]
+                    state["made"] = first + len(results)
+                    state["steps"] += sum(each.steps for each in results)
                     watch.keep(state)
                     watch.look(float(state["made"]), state["steps"])
         except KeyboardInterrupt:

@@ -218,11 +218,11 @@ def continued(
     >>> [round(each.period, 4) for each in family]
     [6.1918, 6.1914]
     """
-    problem, found = orbit.problem, [orbit]
+    problem, orbits = orbit.problem, [orbit]
     index = _index(problem, along)
     free = tuple(name for name in orbit.free if name != along)
     for value in np.atleast_1d(as_numbers("values", values)).tolist():
-        points = [np.concatenate([each.y0, each.problem.par, [each.period]]) for each in found[-2:]]
+        points = [np.concatenate([each.y0, each.problem.par, [each.period]]) for each in orbits[-2:]]
         before, last = points[0], points[-1]
         step = last[index] - before[index]
         guess = last + (last - before) * ((value - last[index]) / step if step else 0.0)
@@ -231,11 +231,11 @@ def continued(
         parameters: Any = problem.system.unpack(par)
         end = problem.t0 + float(guess[-1])
         base = problem.replace(y0=y0, parameters=parameters, t_end=end)
-        made = periodic(base, method=orbit.method, free=free, mirror=orbit.mirror, tol=tol, most=most)
-        found.append(made)
-        if not made.converged:
+        next_orbit = periodic(base, method=orbit.method, free=free, mirror=orbit.mirror, tol=tol, most=most)
+        orbits.append(next_orbit)
+        if not next_orbit.converged:
             break
-    return found[1:]
+    return orbits[1:]
 
 
 @dataclass(frozen=True)
@@ -300,10 +300,10 @@ class _Search:
         """Return the state after a time, and tangent vectors there; no state where that is not reached."""
         stepper = with_variations(self._problem(point), self.method)
         stepper.follow(states, parameters)
-        made = stepper.advance([self.problem.t0 + span])
-        if made.status is not Status.FINISHED or not np.isfinite(stepper.variations).all():
+        samples = stepper.advance([self.problem.t0 + span])
+        if samples.status is not Status.FINISHED or not np.isfinite(stepper.variations).all():
             return None, states
-        return made.y[-1], stepper.variations[-1]
+        return samples.y[-1], stepper.variations[-1]
 
     def better(
         self, point: _Point, correction: Array, size: float, tries: int

@@ -95,7 +95,7 @@ class Recorded:
             self._go(time)
             here, last = stepper.checkpoint(), stepper.recorder(1)
             stepper.record(last)
-            self.y[i] = self._made(stepper.advance(np.array([time]))).y[0]
+            self.y[i] = self._finished(stepper.advance(np.array([time]))).y[0]
             self._parts.append(_Sample(i, last))
             stepper.restore(here)  # the steps go on as if there were no sample
         segments = [part for part in self._parts if isinstance(part, _Segment)]
@@ -129,10 +129,10 @@ class Recorded:
     def _record(self, most: int, time: float) -> Any:
         records = self._stepper.recorder(most)
         self._stepper.record(records)
-        self._made(self._stepper.march(time, most))
+        self._finished(self._stepper.march(time, most))
         return records
 
-    def _made(self, samples: Samples) -> Samples:
+    def _finished(self, samples: Samples) -> Samples:
         if samples.status is not Status.FINISHED:
             raise InputError(f"there is no gradient of what is not reached: {samples.reason}")
         return samples

@@ -78,8 +78,8 @@ class Course:
         """Yield the vectors at times, in order, as far as the trajectory gets."""
         first, size, exponents = 0, 1, 0.0
         while first < times.size and self.status is Status.FINISHED:
-            made = self._stepper.advance(times[first : first + size])
-            self.status, self.reason = made.status, made.reason
+            samples = self._stepper.advance(times[first : first + size])
+            self.status, self.reason = samples.status, samples.reason
             vectors = self._stepper.variations
             lengths = np.linalg.norm(vectors, axis=1)
             good = (np.isfinite(lengths) & (lengths > 0.0)).all(axis=1)
@@ -93,7 +93,7 @@ class Course:
             if not len(lengths):
                 return
             logarithms = np.log(lengths) + exponents * np.log(2.0)
-            yield Chunk(made.t[: len(lengths)], vectors / lengths[:, np.newaxis], logarithms)
+            yield Chunk(samples.t[: len(lengths)], vectors / lengths[:, np.newaxis], logarithms)
             shift = np.rint(np.log2(lengths[-1]))
             self._stepper.scale(np.exp2(-shift))
             exponents = exponents + shift

@@ -29,10 +29,10 @@ class _Count:
 
 class _Direction:
     def checked(self, owner: str, name: str, value: Any) -> int:
-        found = _whole(value)
-        if found not in (-1, 0, 1):
+        direction = _whole(value)
+        if direction not in (-1, 0, 1):
             raise refusal(owner, name, value, "1, -1 or 0 (both)")
-        return found
+        return direction
 
 
 @dataclass(frozen=True)
@@ -103,13 +103,13 @@ def named(events: Any) -> dict[str, Event]:
         For anything else, or two events of one name.
     """
     listed = list(events) if isinstance(events, Sequence) else [events]
-    made = [event if isinstance(event, Event) else Event(event) for event in listed]
-    found: dict[str, Event] = {}
-    for i, event in enumerate(made):
+    events_ = [event if isinstance(event, Event) else Event(event) for event in listed]
+    by_name: dict[str, Event] = {}
+    for i, event in enumerate(events_):
         own = getattr(event.g, "__name__", "<lambda>")
-        plain = own if own.isidentifier() else ("event" if len(made) == 1 else f"event_{i}")
+        plain = own if own.isidentifier() else ("event" if len(events_) == 1 else f"event_{i}")
         name = event.name or plain
-        if name in found:
+        if name in by_name:
             raise InputError(f"two events have the name {name!r}; give one of them another with name=.")
-        found[name] = event
-    return found
+        by_name[name] = event
+    return by_name

@@ -79,12 +79,12 @@ class Hits:
     def occurrences(self) -> dict[str, Occurrences]:
         """Return what has happened, by the events' names."""
         t, y, after, event, direction = self._joined()
-        found = {}
+        result = {}
         for i, name in enumerate(self.names):
             own = event == i
-            made = after[own] if self._acts[i] else None
-            found[name] = Occurrences(t[own], y[own], direction[own], made)
-        return found
+            after_ = after[own] if self._acts[i] else None
+            result[name] = Occurrences(t[own], y[own], direction[own], after_)
+        return result
 
     def _joined(self) -> tuple[Array, Array, Array, NDArray[np.int64], NDArray[np.int64]]:
         none, nowhere = np.empty(0, dtype=np.int64), np.empty((0, self._dim))
@@ -156,7 +156,7 @@ class Ending:
     error: Exception | None = None
 
     @classmethod
-    def of(cls, search: Finder, status: Status, reason: str, start: float, stop: float) -> "Ending":
+    def from_search(cls, search: Finder, status: Status, reason: str, start: float, stop: float) -> "Ending":
         """Return how it ended, from how the steps did, between two times."""
         if search.hits.terminal is not None:
             return cls(Status.EVENT, search.hits.reason, search.hits.stop)

@@ -39,14 +39,14 @@ def follow(
     """
     stop = threading.Event()
 
-    def one(i: int) -> Member:
-        return _one(start, starts[i], par[i], own_times(times, i), t0, stop)
+    def member(i: int) -> Member:
+        return _single(start, starts[i], par[i], own_times(times, i), t0, stop)
 
     if threads == 1 or len(starts) == 1:
-        return [one(i) for i in range(len(starts))]
+        return [member(i) for i in range(len(starts))]
     with ThreadPoolExecutor(threads) as pool:
         try:
-            return list(pool.map(one, range(len(starts))))
+            return list(pool.map(member, range(len(starts))))
         except BaseException:
             stop.set()  # the others come back at once
             raise
@@ -57,7 +57,7 @@ def own_times(times: Array, i: int) -> Array:
     return times if times.ndim == 1 else times[i][~np.isnan(times[i])]
 
 
-def _one(
+def _single(
     start: Callable[..., Any], y0: Array, par: Array, times: Array, t0: float, stop: threading.Event
 ) -> Member:
     y, steps = np.full((1, times.size, y0.size), np.nan), np.zeros(1, dtype=np.int64)
@@ -74,9 +74,9 @@ def _one(
     if status is Status.FINISHED:
         stepper.look_to(end)
     reached = end if status is Status.FINISHED else stepper.t
-    ending = Ending.of(stepper.search, status, samples.reason, t0, reached)
+    ending = Ending.from_search(stepper.search, status, samples.reason, t0, reached)
     n = ending.count(samples.t, stepper.search)
     y[0, :n], steps[0] = samples.y[:n], stepper.stats.steps
-    made = Trajectories(times, y, [ending.status], [ending.reason], np.array([ending.stop]), steps)
-    made.extra[0] = telling(stepper.stats)
-    return made, stepper.search.hits.occurrences()
+    result = Trajectories(times, y, [ending.status], [ending.reason], np.array([ending.stop]), steps)
+    result.extra[0] = telling(stepper.stats)
+    return result, stepper.search.hits.occurrences()

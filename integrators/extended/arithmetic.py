@@ -128,8 +128,8 @@ def exp(a):
     u = times(r, _series(r, _EXP))
     for _ in range(9):
         u = plus(plus(u, u), times(u, u))
-    one = plus(u, 1.0)
-    return complex(math.ldexp(one.real, int(k)), math.ldexp(one.imag, int(k)))
+    sum_ = plus(u, 1.0)
+    return complex(math.ldexp(sum_.real, int(k)), math.ldexp(sum_.imag, int(k)))
 
 
 @njit
@@ -221,6 +221,6 @@ class _Operators(ast.NodeTransformer):
 def compiled(text: str, name: str) -> Any:
     """Compile what `problems.emit.source` has printed for numba, for numbers instead of doubles."""
     tree = ast.fix_missing_locations(_Operators().visit(ast.parse(text)))
-    namespace: dict[str, Any] = {"np": np, **{one.__name__: one for one in FUNCTIONS}}
+    namespace: dict[str, Any] = {"np": np, **{function.__name__: function for function in FUNCTIONS}}
     exec(compile(tree, "<field>", "exec"), namespace)  # noqa: S102 -- emitted from a graph
     return njit(namespace[name])

@@ -227,7 +227,7 @@ class DoubleDoubleStepper(RestorableStepper):
         self._y = y.real.copy()
         return False
 
-    def _one(self) -> tuple[float, Array] | None:
+    def _one_step(self) -> tuple[float, Array] | None:
         if not self._go(self._n + 1):
             return None
         t = self._time(self._n)

@@ -21,12 +21,12 @@ SOLVED = 1e-27  # ... and the largest at which it may stagnate
 @cache
 def tables(s: int) -> tuple[Numbers, Numbers, Numbers]:
     """Return nodes and weights, (s,), and coefficients, (s, s)."""
-    made = legendre.tables(s, s)
-    integrals, projection = _dd(made.integrals), _dd(made.projection)
+    doubles = legendre.tables(s, s)
+    integrals, projection = _dd(doubles.integrals), _dd(doubles.projection)
     matrix = DD(np.zeros((s, s)))
     for j in range(s):
         matrix = matrix + integrals[:, j, None] * projection[j]
-    return _numbers(made.nodes), _numbers(made.weights), _numbers(matrix)
+    return _numbers(doubles.nodes), _numbers(doubles.weights), _numbers(matrix)
 
 
 def ends_of_projection(s: int) -> Numbers:
@@ -44,10 +44,10 @@ def _numbers(table: Any) -> Numbers:
 
 def field_of(system: System) -> tuple[str, Any]:
     """Return a digest of a system's field, and the field for numbers: ``field(t, y, par, out)``."""
-    made = emit.source(system, "field", "numba", limit=0)
-    key = hashlib.sha256(made.text.encode()).hexdigest()
+    source = emit.source(system, "field", "numba", limit=0)
+    key = hashlib.sha256(source.text.encode()).hexdigest()
     if key not in _fields:
-        _fields[key] = compiled(made.text, made.name)
+        _fields[key] = compiled(source.text, source.name)
     return key, _fields[key]
 
 

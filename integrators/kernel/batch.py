@@ -91,7 +91,7 @@ def prepare_batch(
     lanes = program.in_lanes() if work.sample == "partial" else None
     if lanes is None:
         return work.all_alone
-    return partial(work.run, (_Own if lanes.varying else _Fixed).of(lanes, work))
+    return partial(work.run, (_Own if lanes.varying else _Fixed).planned(lanes, work))
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,12 +135,12 @@ class _Work:
         with ThreadPoolExecutor(self.threads) as pool:
             waiting = [pool.submit(do, job) for job in jobs]
             try:
-                for made in waiting:
-                    made.result()
+                for future in waiting:
+                    future.result()
             except BaseException:
                 self.stop.set()
-                for made in waiting:
-                    made.cancel()
+                for future in waiting:
+                    future.cancel()
                 raise
 
     def alone(self, i: int) -> None:
@@ -160,8 +160,8 @@ class _Work:
         stats = stepper.stats
         result.steps[i], result.iterations[i] = stats.steps, stats.iterations or 0
         result.evaluations[i] = stats.evaluations or 0
-        if found := telling(stats):
-            result.extra[i] = found
+        if extra := telling(stats):
+            result.extra[i] = extra
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,7 +176,7 @@ class _InLanes:
     spare: list[Any] = field(default_factory=list)
 
     @classmethod
-    def of(cls, lanes: Lanes, work: _Work) -> Self:
+    def planned(cls, lanes: Lanes, work: _Work) -> Self:
         """Plan; allocate."""
         result, n = work.result, len(work.starts)
         h, more = cls.plan(lanes, work)
@@ -186,9 +186,9 @@ class _InLanes:
             "times": np.ascontiguousarray(result.t), "out": result.y, **more,
             "arrived": np.zeros(n, np.int64), "all_sweeps": np.zeros(n, np.int64),
         }  # fmt: skip
-        made = cls(lanes, work, h, {"count": result.t.size, "trajectories": n}, arrays)
-        made.spare.append(made.memory())
-        return made
+        lanes_ = cls(lanes, work, h, {"count": result.t.size, "trajectories": n}, arrays)
+        lanes_.spare.append(lanes_.memory())
+        return lanes_
 
     @classmethod
     def plan(cls, lanes: Lanes, work: _Work) -> tuple[float, dict[str, Any]]:
@@ -269,12 +269,12 @@ class _Own(_InLanes):
 
     def memory(self) -> Any:
         contexts = [self.work.program.contexts()[0] for _ in range(self.lanes.width)]
-        for one in contexts:
-            one.implicit.strategy = self.work.program.solver.strategy
-            one.controller.interval = float(abs(self.work.result.t[-1] - self.work.t0))
-            self.work.program.limit(one, one.controller.interval)
+        for context in contexts:
+            context.implicit.strategy = self.work.program.solver.strategy
+            context.controller.interval = float(abs(self.work.result.t[-1] - self.work.t0))
+            self.work.program.limit(context, context.controller.interval)
         group, _ = self.lanes.groups(self.work.t0, self.h, self.numbers, self.arrays)
-        group.point({"contexts": np.array([one.address for one in contexts])})
+        group.point({"contexts": np.array([context.address for context in contexts])})
         group.first_length = self.work.program.first or 0.0
         return group, contexts
 

@@ -56,7 +56,7 @@ def operations(source: str) -> Counter[str]:
     Counter
         Of ``+``, ``-``, ``*``, ``/``, and function names.
     """
-    found: Counter[str] = Counter()
+    counts: Counter[str] = Counter()
     uniform: set[str] = set()
 
     def varies(node: ast.expr, times: int) -> bool:
@@ -64,13 +64,13 @@ def operations(source: str) -> Counter[str]:
         if isinstance(node, ast.BinOp):
             sides = [varies(side, times) for side in (node.left, node.right)]
             if any(sides):
-                found[NAMES[type(node.op)]] += times
+                counts[NAMES[type(node.op)]] += times
             return any(sides)
         if isinstance(node, ast.UnaryOp):
             return varies(node.operand, times)
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
             arguments = [varies(argument, times) for argument in node.args]
-            found[node.func.id] += times * any(arguments)
+            counts[node.func.id] += times * any(arguments)
             return any(arguments)
         if isinstance(node, ast.Subscript):
             return not (isinstance(node.value, ast.Name) and node.value.id == "par")
@@ -89,7 +89,7 @@ def operations(source: str) -> Counter[str]:
     (function,) = ast.parse(source).body
     if isinstance(function, ast.FunctionDef):
         count(function.body, 1)
-    return found
+    return counts
 
 
 def measure(problem: Problem, k: int, s: int, h: float) -> Cost:
@@ -111,11 +111,11 @@ def measure(problem: Problem, k: int, s: int, h: float) -> Cost:
 def _say(problem: Problem, k: int, s: int, h: float) -> None:
     program = HBVMProgram(problem.system, k=k, s=s, h=h)
     shape, constants = program.shape, program.constants
-    what = "force" if program.second else "field"
-    found = operations(emit.source(problem.system, what, "numba").text)
+    quantity = "force" if program.second else "field"
+    counts = operations(emit.source(problem.system, quantity, "numba").text)
     lanes = constants.lanes * -(-k // constants.lanes)
-    plain = sum(n for name, n in found.items() if name in "+-*")
-    others = ", ".join(f"{lanes * n} {name}" for name, n in sorted(found.items()) if name not in "+-*")
+    plain = sum(n for name, n in counts.items() if name in "+-*")
+    others = ", ".join(f"{lanes * n} {name}" for name, n in sorted(counts.items()) if name not in "+-*")
     form = "second" if program.second else "first"
     print(f"{problem!r}, HBVM({k}, {s}), h = {h:g}, {form}-order form, {shape.rows} rows, {lanes} lanes")
     print(f"  field    {lanes * plain} flops" + (f", {others}" if others else ""))

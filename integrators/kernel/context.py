@@ -158,7 +158,7 @@ class Context(Memory):
     t0 = Real()
     time_low = Real()  # what `t0` lacks, where steps vary
     n = Integer()  # steps since `t0`
-    made = Integer()  # samples
+    samples_written = Integer()  # samples
     state = Array(2, "padded")  # second-order form: blocks [p p p p q q q q]; first-order form: y
     error = Array(2, "padded")  # what `state` lacks, in the same places
     next_state = Array(2, "padded")

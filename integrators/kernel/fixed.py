@@ -35,7 +35,7 @@ class FixedStepper(HBVMStepper):
         self._status, self._reason, self.error = Status.RUNNING, "", None
         return self._make(STOP, np.array([t]), np.zeros(1, dtype=np.int64), np.array([t - t0]))
 
-    def _one(self) -> bool:
+    def _one_step(self) -> bool:
         (numbers, _, place, out), ctx = self._room, self._context
         target = numbers.view(np.int64)[:1]
         target[0] = ctx.n + 1

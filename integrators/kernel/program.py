@@ -142,8 +142,8 @@ class HBVMProgram(Compiled):
         lanes = tables.lanes_for(k)
         self.constants = tables.constants(k, s, self.second, lanes)
         self.kept = None if keep is None else Kept(system, self.constants, keep)
-        what = self.kept.values if self.kept else "force" if self.second else "field"
-        self.field = field_of(system, what, lanes)
+        quantity = self.kept.values if self.kept else "force" if self.second else "field"
+        self.field = field_of(system, quantity, lanes)
         kernel = steps.code()
         block, group = blocks(system)
         rows = system.dim
@@ -155,7 +155,7 @@ class HBVMProgram(Compiled):
         nothing = np.empty(0)
         self._known_velocity = b"?", (nothing, nothing, nothing)
         unit = tables.unit(self.constants, self._velocity_scale(np.full(system.n_par, np.nan)))
-        self.fused = self._sweeps(what, rows, lanes) if unit and not self.kept else None
+        self.fused = self._sweeps(quantity, rows, lanes) if unit and not self.kept else None
         self.shape = Shape(
             rows, self.second, unit, self.field.address, self.fused.address if self.fused else 0,
             system.n_par, block, group, self.constants,
@@ -166,7 +166,7 @@ class HBVMProgram(Compiled):
         self.vectors: dict[tuple[int, bool], Context] = {}
         """Contexts of tangent vectors, by their number and whether they move parameters, to be copied."""
         parts = [self.field, kernel, self.fused, *(self.kept.code if self.kept else ())]
-        self.from_cache = all(made.from_cache for made in parts if made is not None)
+        self.from_cache = all(part.from_cache for part in parts if part is not None)
         self._workspace: Workspace | None = None
         self._in_lanes: tuple[Lanes | None] | None = None
         self._many: HBVMProgram | None = None
@@ -174,11 +174,11 @@ class HBVMProgram(Compiled):
             self.implicit()
         self.compile_seconds = binary.clock() - started
 
-    def _sweeps(self, what: emit.Quantity, rows: int, lanes: int) -> binary.Native | None:
+    def _sweeps(self, quantity: emit.Quantity, rows: int, lanes: int) -> binary.Native | None:
         """Return whole sweeps for a system with a few rows, if they can be compiled with its field."""
         if rows > fused.ROWS or self.constants.route not in (8, 16) or not self.lanes:
             return None
-        return fused.compile_sweeps(self.system, what, lanes, rows)
+        return fused.compile_sweeps(self.system, quantity, lanes, rows)
 
     @property
     def description(self) -> str:
@@ -289,32 +289,32 @@ class HBVMProgram(Compiled):
         if self.for_many is None:
             return self
         if self._many is None:
-            made = self.for_many()
-            self._many = self if made.in_lanes() is None else made
-            self.compile_seconds += made.compile_seconds
-            self.from_cache = self.from_cache and made.from_cache
+            program = self.for_many()
+            self._many = self if program.in_lanes() is None else program
+            self.compile_seconds += program.compile_seconds
+            self.from_cache = self.from_cache and program.from_cache
         return self._many
 
     def in_lanes(self) -> Lanes | None:
         """Return the method on trajectories in lanes, compiled the first time; ``None`` where it has none."""
         if self._in_lanes is None:
-            made, seconds = None, 0.0
+            lanes_, seconds = None, 0.0
             if self.lanes and not self.kept and self.free and self.solver.strategy != ALWAYS_IMPLICIT:
-                made, seconds = lanes_of(
+                lanes_, seconds = lanes_of(
                     self.system, self.constants, self.second, self.shape.unit, self.varying
                 )
             self.compile_seconds += seconds
-            self.from_cache = self.from_cache and (made is None or made.from_cache)
-            self._in_lanes = (made,)
+            self.from_cache = self.from_cache and (lanes_ is None or lanes_.from_cache)
+            self._in_lanes = (lanes_,)
         return self._in_lanes[0]
 
     def implicit(self) -> Workspace:
         """Return memory for the implicit solver; its code is compiled, or loaded, the first time."""
         if self._workspace is None:
-            made = solver_engine.solver.code()
-            self.from_cache = self.from_cache and made.from_cache
-            found = linearization(self.system, second=self.second)
-            self._workspace = Workspace(self.shape, self.solver.kind, found)
+            native = solver_engine.solver.code()
+            self.from_cache = self.from_cache and native.from_cache
+            linear = linearization(self.system, second=self.second)
+            self._workspace = Workspace(self.shape, self.solver.kind, linear)
         return self._workspace.copy()
 
     def scaled(self, h: float) -> dict[str, Array]:
@@ -334,7 +334,7 @@ class HBVMProgram(Compiled):
     def _context(self, *, partial: bool) -> Context:
         if partial not in self._fresh:
             # when it is complete: another thread may copy it at once
-            self._fresh[partial] = self._made(partial=partial)
+            self._fresh[partial] = self._new_context(partial=partial)
         return self._fresh[partial]
 
     def pair(self, par: Array) -> Pair:
@@ -354,13 +354,13 @@ class HBVMProgram(Compiled):
             pair.keep(key)
         return pair
 
-    def _made(self, *, partial: bool) -> Context:
+    def _new_context(self, *, partial: bool) -> Context:
         tables = {**self._fixed, **({} if partial else self.scaled(self.h))}
         more = {"energy.rows": self.system.dim + 1} if self.projected else self._more
-        made = self.kept.context(self.shape, tables) if self.kept else Context(self.shape, tables, more)
-        made.solver.tolerance = TOLERANCE
-        made.solver.log_rest = LOG_REST
-        return made
+        context = self.kept.context(self.shape, tables) if self.kept else Context(self.shape, tables, more)
+        context.solver.tolerance = TOLERANCE
+        context.solver.log_rest = LOG_REST
+        return context
 
     def _put(self, own: Context, partial: Context, par: Array) -> None:
         """Put parameters, and what follows from them, into fresh memory."""
@@ -390,12 +390,12 @@ class HBVMProgram(Compiled):
     def _velocity(self, par: Array) -> tuple[Array, Array, Array]:
         """Return `_velocity_scale`, and `Blocks.speed` and `Blocks.mass` of blocks."""
         key = par.tobytes()
-        known, found = self._known_velocity  # read once: another thread may replace it
+        known, velocities = self._known_velocity  # read once: another thread may replace it
         if known != key:
             velocity, speed = self._velocity_scale(par), np.ones(self.shape.group.size)
             speed[self.shape.block] = np.where(velocity == 0.0, 1.0, np.abs(velocity))
-            self._known_velocity = key, found = key, (velocity, speed, 1.0 / speed)
-        return found
+            self._known_velocity = key, velocities = key, (velocity, speed, 1.0 / speed)
+        return velocities
 
 
 class AdaptiveProgram(HBVMProgram):
@@ -506,10 +506,10 @@ class AdaptiveProgram(HBVMProgram):
     def _energy_code(self) -> binary.Native:
         """Return what writes the gradient of the energy and the energy itself."""
         energy = self.system.invariants["energy"]
-        what = self.system.together(self.system.gradient(energy), energy)
-        made = fields.compile_field(self.system, what, ENERGY_LANES)
-        self.from_cache = self.from_cache and made.from_cache
-        return made
+        quantity = self.system.together(self.system.gradient(energy), energy)
+        native = fields.compile_field(self.system, quantity, ENERGY_LANES)
+        self.from_cache = self.from_cache and native.from_cache
+        return native
 
     @property
     def acts(self) -> bool:
@@ -565,8 +565,8 @@ class AdaptiveProgram(HBVMProgram):
         super().begin(pair, y, par, t0)
         pair.own.kinks.numbers.doubt_end = t0
 
-    def _made(self, *, partial: bool) -> Context:
-        context = super()._made(partial=True)  # with a matrix of its own
+    def _new_context(self, *, partial: bool) -> Context:
+        context = super()._new_context(partial=True)  # with a matrix of its own
         context.solver.log_rest = LOG_REST_VARYING
         if self._energy:
             context.energy.code = self._energy.address
@@ -630,8 +630,8 @@ class ReversibleProgram(AdaptiveProgram):
         """The method with all that steps depend on, as text."""
         return f"Gauss(s={self.constants.s}, tol={self.tol!r}, steps='reversible')"
 
-    def _made(self, *, partial: bool) -> Context:
-        context = super()._made(partial=partial)
+    def _new_context(self, *, partial: bool) -> Context:
+        context = super()._new_context(partial=partial)
         context.solver.log_rest = LOG_REST
         return context
 

@@ -197,7 +197,7 @@ class HBVMStepper(ABC):
                 self._vectors.solve_by(self._implicit)
         program.compile_seconds += binary.clock() - started
 
-    def _check_derivatives(self, what: str) -> None:
+    def _check_derivatives(self, label: str) -> None:
         """Refuse what needs the derivatives of the steps where these have none."""
         system, program = self._program.system, self._program
         if not system.traced:
@@ -208,7 +208,7 @@ class HBVMStepper(ABC):
             need = "a Runge-Kutta method: line integrals are none; use Gauss"
         else:
             return
-        raise InputError(f"{what} of {system.name} need {need}.")
+        raise InputError(f"{label} of {system.name} need {need}.")
 
     def recorder(self, capacity: int) -> Records:
         """Return room for the records of so many steps; see `integrators.protocol.Gradients`."""
@@ -240,10 +240,10 @@ class HBVMStepper(ABC):
             if abs(end - self.t) <= CLOSE * float(np.spacing(abs(end))):
                 return self._status
             if not self._context.solved:  # as after samples that are ends of steps
-                made = self.advance([end], sample="partial")
-                if made.status is not Status.FINISHED:
-                    reason = f"{made.reason} Events are known up to t = {self.t!r} only."
-                    search.trouble = made.status, reason, self.error
+                samples = self.advance([end], sample="partial")
+                if samples.status is not Status.FINISHED:
+                    reason = f"{samples.reason} Events are known up to t = {self.t!r} only."
+                    search.trouble = samples.status, reason, self.error
             if self._status is Status.RUNNING:
                 search.finish(end)
         return self._status
@@ -366,17 +366,17 @@ class HBVMStepper(ABC):
     def step(self) -> Status:
         """Take one step; after a failure, do nothing."""
         plain = self.search is None and self.stop is None and self._implicit is None
-        if not self._status.failed and not (plain and self._one()):
+        if not self._status.failed and not (plain and self._one_step()):
             self.take(1)
         return self._status
 
     @abstractmethod
-    def _one(self) -> bool:
+    def _one_step(self) -> bool:
         """Take one step by one call of the kernel; return whether it is taken, or has failed for good."""
 
     def _is_one(self, outcome: int, taken: int) -> bool:
         """Whether such a call, which comes back with ``taken`` after a step, is all there is to do."""
-        if outcome == taken and self._context.made == 1:
+        if outcome == taken and self._context.samples_written == 1:
             return True
         outcome = self._handled(outcome)
         if outcome != BUDGET:
@@ -487,7 +487,7 @@ class HBVMStepper(ABC):
 
     @property
     def _identity(self) -> Identity:
-        return Identity.of(self._program.description, self._program.system, self._context.par)
+        return Identity.from_system(self._program.description, self._program.system, self._context.par)
 
     def _fill(self, between: int, times: Array, *steps_and_parts: NDArray[Any]) -> Made:
         """Make samples, in chunks so that Ctrl-C is heard between them."""
@@ -496,17 +496,17 @@ class HBVMStepper(ABC):
         out = np.empty((times.size, self._dim))
         if self._vectors:
             self._vectors.room(times.size)
-        outcome, made, why, ctx = BUDGET, 0, None, self._context
+        outcome, count, why, ctx = BUDGET, 0, None, self._context
         late = perf_counter() + self.time_limit
-        while outcome == BUDGET and why is None and not (made and perf_counter() > late):
+        while outcome == BUDGET and why is None and not (count and perf_counter() > late):
             before = ctx.counters.steps
-            outcome = self._call(engine.ADVANCE, between, times, out, made, self._budget(), *addresses)
-            made = ctx.made
+            outcome = self._call(engine.ADVANCE, between, times, out, count, self._budget(), *addresses)
+            count = ctx.samples_written
             if outcome == BUDGET:
                 why = self._ended(ctx.counters.steps - before)
         if self._vectors:
-            self._vectors.note(times[:made])
-        return out[:made], outcome, why
+            self._vectors.note(times[:count])
+        return out[:count], outcome, why
 
     def _budget(self) -> int:
         """Return how many steps the kernel may take at a time."""
@@ -517,7 +517,7 @@ class HBVMStepper(ABC):
         return None
 
     def _call(
-        self, what: int, between: int, times: Array, out: Array, made: int, budget: int,
+        self, operation: int, between: int, times: Array, out: Array, written: int, budget: int,
         targets: int = 0, parts: int = 0, /,
     ) -> int:  # fmt: skip
         """Call the kernel once; put the implicit solver to work where it is wanted."""
@@ -529,8 +529,8 @@ class HBVMStepper(ABC):
                 self._take_implicit()
         with self._pace:
             outcome = self._enter(
-                what, self._context.address, self._partial.address, between, times.size,
-                address(times), targets, parts, made, address(out), budget,
+                operation, self._context.address, self._partial.address, between, times.size,
+                address(times), targets, parts, written, address(out), budget,
             )  # fmt: skip
         return self._handled(outcome)
 

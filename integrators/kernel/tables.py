@@ -113,8 +113,8 @@ def constants(k: int, s: int, second: bool, lanes: int) -> Constants:
     )
     kept = store.get(name)
     if kept is None or len(kept) != 8 * sum(rows * columns for rows, columns in shapes):
-        made = _make(k, s, second, route)
-        kept = b"".join(made[part].astype("<f8").tobytes() for part in NAMES)
+        parts = _make(k, s, second, route)
+        kept = b"".join(parts[part].astype("<f8").tobytes() for part in NAMES)
         store.put(name, kept)
     # Read back even if just made: what is computed from the tables depends on their layout, in the last bit.
     arrays: dict[str, Array] = {}

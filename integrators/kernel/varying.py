@@ -69,12 +69,12 @@ class AdaptiveStepper(HBVMStepper):
     def _extra(self) -> dict[str, Any]:
         c, context = self._program.constants, self._context
         extra = {**super()._extra(), "k": c.k, "s": c.s}
-        if found := context.kinks.count:
-            kept = context.kinks.places.reshape(-1, 2)[: min(found, KINKS_KEPT)]
+        if kinks := context.kinks.count:
+            kept = context.kinks.places.reshape(-1, 2)[: min(kinks, KINKS_KEPT)]
             extra["kinks"] = [(float(t), float(h)) for t, h in kept]
         return extra
 
-    def _one(self) -> bool:
+    def _one_step(self) -> bool:
         if self._breakpoints.size or self._max_steps is not None:
             return False
         (ends, _, place, out), ctx = self._room, self._context
@@ -106,8 +106,8 @@ class AdaptiveStepper(HBVMStepper):
         ahead = ctx.controller.next_length > 0.0
         if not points.size:
             return math.inf if ahead else -math.inf
-        found = points[points > self.t] if ahead else points[points < self.t][::-1]
-        beyond = (point for point in found.tolist() if not self._is_at(point))
+        ahead_ = points[points > self.t] if ahead else points[points < self.t][::-1]
+        beyond = (point for point in ahead_.tolist() if not self._is_at(point))
         stop = next(beyond, math.inf if ahead else -math.inf)
         ctx.controller.stop, ctx.controller.breaks = stop, int(math.isfinite(stop))
         return stop
@@ -166,21 +166,21 @@ class AdaptiveStepper(HBVMStepper):
             states, outcome, why = self._fill(between, times)
             return self._samples(times[: len(states)], states, outcome, why)
         out = np.empty((times.size, self._dim))
-        made, outcome, why = 0, DONE, None
-        while made < times.size and outcome == DONE and why is None:
+        count, outcome, why = 0, DONE, None
+        while count < times.size and outcome == DONE and why is None:
             stop = self._stop()
             beyond = np.flatnonzero((times - stop) * self._context.controller.next_length > 0.0)
-            last = int(beyond[0]) if beyond.size and beyond[0] >= made else times.size
-            piece = times[made:last]
+            last = int(beyond[0]) if beyond.size and beyond[0] >= count else times.size
+            piece = times[count:last]
             meets = last < times.size or times[-1] == stop
             grid = np.append(piece, stop) if meets and (not piece.size or piece[-1] != stop) else piece
             states, outcome, why = self._fill(between, grid)
             n = min(len(states), piece.size)
-            out[made : made + n] = states[:n]
-            made += n
+            out[count : count + n] = states[:n]
+            count += n
             if meets and outcome == DONE and why is None:
                 self._restart(stop)
-        return self._samples(times[:made], out[:made], outcome, why)
+        return self._samples(times[:count], out[:count], outcome, why)
 
     def _handled(self, outcome: int) -> int:
         outcome = super()._handled(outcome)
@@ -237,7 +237,7 @@ class AdaptiveStepper(HBVMStepper):
         pieces = [scout.take_steps(self._goal, limit=LOOK_AHEAD)]
         if not scout.status.failed and scout.stats.steps < LOOK_AHEAD:
             pieces.append(scout.advance([self._goal]))
-        return np.concatenate([np.column_stack([made.t, np.abs(made.y)]) for made in pieces])
+        return np.concatenate([np.column_stack([samples.t, np.abs(samples.y)]) for samples in pieces])
 
     def _charge(self, scout: "AdaptiveStepper") -> None:
         """Count the work of a trajectory that looks ahead as this one's."""
@@ -259,19 +259,19 @@ class AdaptiveStepper(HBVMStepper):
         nudge = math.sqrt(max(self._program.tol, SMALLEST))
         moved = np.random.default_rng(0).choice([-1.0, 1.0], sizes.size)
         times = np.linspace(self.t, end, 65)[1:]
-        found = []
+        states = []
         for shift in (0.0, nudge):
             scout = self._scout(self.y + shift * moved * sizes)
             scout._given = scout._context.estimate.expected[:] = expected
             scout._context.estimate.rescaled = SCALE_LASTS
             scout._max_steps = min(MOST_COMPARED, self._max_steps or MOST_COMPARED)
-            made = scout.advance(times)
+            samples = scout.advance(times)
             self._charge(scout)
-            found.append(made.y)
-        count = min(map(len, found))
+            states.append(samples.y)
+        count = min(map(len, states))
         if count < len(times):
             return math.inf
-        apart = np.abs(found[0] - found[1]) / np.where(sizes > 0.0, sizes, math.inf)
+        apart = np.abs(states[0] - states[1]) / np.where(sizes > 0.0, sizes, math.inf)
         largest = np.maximum(np.append(nudge, apart.max(axis=1)), nudge**1.5)
         return float((largest / np.minimum.accumulate(largest)).max())
 
@@ -334,18 +334,18 @@ class AdaptiveStepper(HBVMStepper):
             if self._vectors:
                 self._vectors.room(n + 1)
             outcome = self._call(engine.TAKE, PARTIAL, times, out, 0, n)
-            made = self._context.made
-            steps += made
-            pieces.append((times[:made], out[:made]))
+            count = self._context.samples_written
+            steps += count
+            pieces.append((times[:count], out[:count]))
             if math.isfinite(stop) and self._is_at(stop):
                 if outcome == DONE and stop != end:
                     outcome = BUDGET
-                times[made - 1 : made] = stop
+                times[count - 1 : count] = stop
                 self._restart(stop)
             elif outcome == BUDGET and (n == 0 or (limit is None and self._budget(1))):
-                why = self._ended(made)
+                why = self._ended(count)
             if self._vectors:
-                self._vectors.note(times[:made])
+                self._vectors.note(times[:count])
         t, y = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
         return self._samples(t, y, DONE if outcome == BUDGET else outcome, why)
 

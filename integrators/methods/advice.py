@@ -181,10 +181,12 @@ def advise(problem: Problem, accuracy: Annotated[float, _Accuracy()] = 1e-10) ->
     scout = _Scout(problem)
     span = _Part(problem, scout.end, goal)
     piece = _Part(problem, scout.piece_end, goal)
-    found = list(_candidates(scout, span, piece, goal))
-    meeting = [one for one in found if span.expected(one) <= goal]
-    kept = meeting or [min(found, key=span.expected)]
-    proposals = tuple(sorted((span.proposal(one, piece) for one in kept), key=lambda made: made.seconds))
+    candidates = list(_candidates(scout, span, piece, goal))
+    meeting = [candidate for candidate in candidates if span.expected(candidate) <= goal]
+    kept = meeting or [min(candidates, key=span.expected)]
+    proposals = tuple(
+        sorted((span.proposal(candidate, piece) for candidate in kept), key=lambda proposal: proposal.seconds)
+    )
     reached = bool(meeting) and span.horizon == problem.t_end
     why = _why(scout, span, proposals, bool(meeting), accuracy)
     return Advice(problem, accuracy, proposals, reached, span.end, span.horizon, why)
@@ -200,11 +202,11 @@ class _Scout:
         while t != problem.t_end and (count < PIECE or perf_counter() < began + LOOK):
             before = perf_counter()
             t = problem.t_end if abs(problem.t_end - t) <= abs(length) else t + length
-            made = stepper.advance(np.array([t]), sample="steps")
-            parts.append(made.t)
-            count += made.t.size
-            if made.status is not Status.FINISHED:
-                self.reason = made.reason
+            samples = stepper.advance(np.array([t]), sample="steps")
+            parts.append(samples.t)
+            count += samples.t.size
+            if samples.status is not Status.FINISHED:
+                self.reason = samples.reason
                 break
             if perf_counter() - before < LOOK / 16:
                 length *= 2.0
@@ -241,12 +243,12 @@ class _Part:
     def __init__(self, problem: Problem, end: float, goal: float):
         self.problem, self.end = problem, end
         self.times = np.linspace(problem.t0, end, SAMPLES + 1)[1:]
-        made = [self._states(method) for method in ACCURATE]
-        there = [self._positions(one[0]) for one in made if one is not None]
+        states = [self._states(method) for method in ACCURATE]
+        there = [self._positions(first[0]) for first in states if first is not None]
         if not there:
             raise InputError(f"HBVM() does not reach t={end!r}; integrate to there and see its status.")
         self._truth, self._size = there[0], float(np.abs(there[0]).max()) or 1.0
-        apart = [self._distance(one, other) for one, other in combinations(there, 2)]
+        apart = [self._distance(first, other) for first, other in combinations(there, 2)]
         self.floor = np.maximum(np.max(apart, axis=0), FLOOR) if apart else np.full(SAMPLES, np.inf)
         within = int(np.count_nonzero(self.floor <= goal))
         self.known = within or SAMPLES
@@ -308,9 +310,9 @@ class _Part:
     def _positions(self, y: Array) -> Array:
         return y[:, : y.shape[1] // 2] if _has_energy(self.problem) else y
 
-    def _distance(self, one: Array, other: Array) -> Array:
+    def _distance(self, first: Array, other: Array) -> Array:
         """Return the largest distance up to each sample, relative to the largest component there is."""
-        return np.maximum.accumulate(np.abs(one - other).max(axis=1) / self._size)
+        return np.maximum.accumulate(np.abs(first - other).max(axis=1) / self._size)
 
 
 def _started(problem: Problem, method: MethodBase) -> Any:
@@ -392,7 +394,7 @@ def _why(scout: _Scout, span: _Part, proposals: tuple[Proposal, ...], met: bool,
             f"{100.0 / span.whole:.2g} % of the span; what comes "
             "later is extrapolated, and wrong where the motion becomes chaotic or an encounter comes."
         )
-    keeping = next((one for one in proposals if (one.energy or 0.0) <= KEPT), None)
+    keeping = next((proposal for proposal in proposals if (proposal.energy or 0.0) <= KEPT), None)
     if first.energy is not None and first.energy > KEPT and keeping is not None:
         words.append(
             f"Its energy is off by {first.energy:.1g}; {keeping.method!r} keeps it to {keeping.energy:.1g} "

@@ -138,7 +138,7 @@ class Work:
     lanes: bool = False
 
     @classmethod
-    def of(cls, system: System, *, lanes: bool = False) -> "Work":
+    def counted(cls, system: System, *, lanes: bool = False) -> "Work":
         """Count the operations of a system's field."""
         second = system.separable
         rows = system.dof if second and system.dof is not None else system.dim
@@ -204,7 +204,7 @@ def choose(system: System, tol: float, *, lanes: bool = False) -> tuple[int, int
         Bound on the estimated error of a step's quadrature; ``None``: it is 0, or there is no
         energy to keep.
     """
-    work = Work.of(system, lanes=lanes)
+    work = Work.counted(system, lanes=lanes)
     nu = None if system.energy is None else degree(system)
 
     def bound(k: int, s: int) -> float | None:

@@ -193,9 +193,9 @@ class Gauss(MethodBase):
         """Compile as `HBVM.compile` does, Poisson systems like any other."""
         if (refusal := self._refusal(system)) is not None:
             raise InputError(refusal)
-        made = self._compiled(system)
-        made.method = self
-        return made
+        program = self._compiled(system)
+        program.method = self
+        return program
 
     def _compiled(self, system: System) -> Any:
         if self.precision != "double" and self.h is not None:

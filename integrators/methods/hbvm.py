@@ -265,9 +265,9 @@ class HBVM(MethodBase):
         """Compile the vector field of ``system``, and the kernel if this machine has not yet."""
         if (refusal := self._refusal(system)) is not None:
             raise InputError(refusal)
-        made = self._compiled(system)
-        made.method = self
-        return made
+        program = self._compiled(system)
+        program.method = self
+        return program
 
     def _compiled(self, system: System) -> Any:
         keep = () if system.kind == "poisson" else None
@@ -289,11 +289,11 @@ class HBVM(MethodBase):
             if self.projection:
                 return program(choose_projected(tol))
             alone, many = choose(system, tol), choose(system, tol, lanes=True)
-            made = program(alone)
+            single = program(alone)
             if many != alone:
                 accurate = many[0] < MANY and tol == TOLERANCE
-                made.for_many = lambda: program(many, ACCURATE_IN_LANES if accurate else tol)
-            return made
+                single.for_many = lambda: program(many, ACCURATE_IN_LANES if accurate else tol)
+            return single
         from integrators.kernel.program import HBVMProgram  # numba is for those who integrate
 
         assert self.h is not None

@@ -183,13 +183,13 @@ class LineIntegral(MethodBase):
         """
         from integrators.kernel.program import AdaptiveProgram, HBVMProgram
 
-        made: HBVMProgram | AdaptiveProgram
+        program: HBVMProgram | AdaptiveProgram
         if self.tol is not None:
-            made = AdaptiveProgram(
+            program = AdaptiveProgram(
                 system, k=self.k, s=self.s, tol=self.tol, h=self.h, keep=self.invariants, atol=self.atol
             )
         else:
             assert self.h is not None
-            made = HBVMProgram(system, k=self.k, s=self.s, h=self.h, keep=self.invariants)
-        made.method = self
-        return made
+            program = HBVMProgram(system, k=self.k, s=self.s, h=self.h, keep=self.invariants)
+        program.method = self
+        return program

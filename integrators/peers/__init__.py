@@ -45,11 +45,11 @@ def load(library: str, *modules: str) -> ModuleType:
         If one of them is not installed.
     """
     try:
-        found = [import_module(name) for name in modules or (library,)]
+        imported = [import_module(name) for name in modules or (library,)]
     except ImportError as error:
         if library in without_wheels():
             fix = f"it has wheels for {WHEELS[library]}; on this system it must be built from its sources."
         else:
             fix = 'install the peers with pip install "hbvm-bench[peers]".'
         raise MissingLibraryError(f"{library} is not installed ({error}); {fix}") from error
-    return found[0]
+    return imported[0]

@@ -99,15 +99,15 @@ class Composition(FixedStep):
         if why := self.refuses(system):
             raise InputError(f"{self!r} cannot integrate {system.name}: {why}")
         chi, adjoint = maps(system, self.type)
-        made: dict[float, Any] = {}  # by the length of a step
+        sequences: dict[float, Any] = {}  # by the length of a step
 
         def march(t: float, h: float, first: int, n: int, y: Array, par: Array) -> None:
-            if h not in made:
-                made[h] = _sequence(self.type, h)
-            one, here = made[h]._integrate_onestep, y
+            if h not in sequences:
+                sequences[h] = _sequence(self.type, h)
+            onestep, here = sequences[h]._integrate_onestep, y
             forth, back = (lambda h, t, y: chi(h, t, y, par)), (lambda h, t, y: adjoint(h, t, y, par))
             for number in range(first, first + n):
-                _, here = one(t + number * h, here, forth, back)
+                _, here = onestep(t + number * h, here, forth, back)
             y[:] = here
 
         return march
@@ -148,6 +148,6 @@ def maps(system: System, type: str) -> tuple[Any, Any]:  # noqa: A002
         new[n:] += h * F
         return new
 
-    for one in (kick_drift, drift_kick):
-        one(0.0, 0.0, np.ones(system.dim), system.pack({}))
+    for function in (kick_drift, drift_kick):
+        function(0.0, 0.0, np.ones(system.dim), system.pack({}))
     return (drift_kick, kick_drift) if last else (kick_drift, drift_kick)

@@ -111,17 +111,18 @@ class CVODEProgram(ProgramBase):
             return self._solver(right, **options, **self._jacobian(par))
 
     def _jacobian(self, par: Array) -> dict[str, Any]:
-        found = self.jacobian
-        if found is None:
+        jacobian = self.jacobian
+        if jacobian is None:
             return {}
         entries = self.entries
-        if found.size > DENSE and found.density < SPARSE:
+        if jacobian.size > DENSE and jacobian.density < SPARSE:
             from scipy.sparse import csc_matrix
 
             numbers = csc_matrix(
-                (np.arange(1, found.rows.size + 1), (found.rows, found.columns)), (found.size, found.size)
+                (np.arange(1, jacobian.rows.size + 1), (jacobian.rows, jacobian.columns)),
+                (jacobian.size, jacobian.size),
             )
-            order, values = np.asarray(numbers.data, dtype=np.int64) - 1, np.empty(found.rows.size)
+            order, values = np.asarray(numbers.data, dtype=np.int64) - 1, np.empty(jacobian.rows.size)
 
             def fill(t: float, y: Array, slope: Array, out: Array) -> None:
                 del slope
@@ -130,7 +131,7 @@ class CVODEProgram(ProgramBase):
 
             pattern = numbers.astype(bool).astype(float)
             return {"jacfn": fill, "linsolver": "sparse", "sparsity": pattern}
-        rows, columns, few = found.rows, found.columns, np.empty(found.rows.size)
+        rows, columns, few = jacobian.rows, jacobian.columns, np.empty(jacobian.rows.size)
 
         def whole(t: float, y: Array, slope: Array, out: Array) -> None:
             del slope
@@ -196,16 +197,16 @@ class CVODEStepper(StepperBase):
         start = self._t
         self._sign = 1 if end > start else -1
         try:
-            found = self._solver.solve(np.array([start, end]), self._y)
+            result = self._solver.solve(np.array([start, end]), self._y)
         except UserError as raised:
             self._broken(raised, start)
             return np.empty(0), np.empty((0, self._y.size))
-        self._note(found)
-        self._stats.steps += found.t.size - 1
-        self._tn, self._yn = float(found.t[-1]), found.y[-1]
-        if self._refused(found, self._tn):
+        self._note(result)
+        self._stats.steps += result.t.size - 1
+        self._tn, self._yn = float(result.t[-1]), result.y[-1]
+        if self._refused(result, self._tn):
             return np.empty(0), np.empty((0, self._y.size))
-        return found.t[-1:], found.y[-1:]
+        return result.t[-1:], result.y[-1:]
 
     def _step_states(self, end: float) -> tuple[Array, Array]:
         sign, watch = self._towards(end), crawl(self, self._tn, end)
@@ -217,7 +218,7 @@ class CVODEStepper(StepperBase):
             states.append(self._yn)
         return np.array(times[1:]), np.array(states).reshape(len(times), -1)[1:]
 
-    def _one(self) -> tuple[float, Array] | None:
+    def _one_step(self) -> tuple[float, Array] | None:
         self._towards(self._t + (self._sign or 1) * self._far(self._t))
         if self._tn == self._t and not self._step(Crawl(self._t, self._t)):
             return None
@@ -234,36 +235,36 @@ class CVODEStepper(StepperBase):
         end = before + self._sign * self._far(before) if stop is None else stop
         try:
             # After a time within a step CVODE returns that step once more.
-            found = self._solver.step(end, "onestep", stop)
+            result = self._solver.step(end, "onestep", stop)
             for _ in range(UNMOVED):
-                if found.t != before or not found.success:
+                if result.t != before or not result.success:
                     break
-                found = self._solver.step(end, "onestep", stop)
+                result = self._solver.step(end, "onestep", stop)
         except UserError as raised:
             self._broken(raised, before)
             return False
-        self._note(found)
-        if self._refused(found, before):
+        self._note(result)
+        if self._refused(result, before):
             return False
-        if found.t == before:
+        if result.t == before:
             self._fail(
                 Status.STEP_UNDERFLOW, before, f"CVODE's steps at t = {before!r} are too short to change t."
             )
             return False
         self._stats.steps += 1
-        self._tn, self._yn = float(found.t), np.array(found.y, dtype=np.float64)
+        self._tn, self._yn = float(result.t), np.array(result.y, dtype=np.float64)
         if stalled := watch.sees(self._tn):
             self._fail(Status.STALLED, self._tn, stalled)
         return not stalled
 
-    def _note(self, found: Any) -> None:
-        self._stats.evaluations = self._evaluated + int(found.nfev)
-        self._stats.extra["jacobians"] = int(found.njev)
+    def _note(self, result: Any) -> None:
+        self._stats.evaluations = self._evaluated + int(result.nfev)
+        self._stats.extra["jacobians"] = int(result.njev)
 
-    def _refused(self, found: Any, t: float) -> bool:
-        if found.success:
+    def _refused(self, result: Any, t: float) -> bool:
+        if result.success:
             return False
-        self._fail(Status.STEP_UNDERFLOW, t, f"CVODE gave up at t = {t!r}: {found.message}")
+        self._fail(Status.STEP_UNDERFLOW, t, f"CVODE gave up at t = {t!r}: {result.message}")
         return True
 
     def _broken(self, raised: UserError, t: float) -> None:

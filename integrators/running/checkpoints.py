@@ -28,7 +28,7 @@ class Identity:
     par: bytes
 
     @classmethod
-    def of(cls, method: str, system: System, par: Any) -> "Identity":
+    def from_system(cls, method: str, system: System, par: Any) -> "Identity":
         """Return that of a system with parameters, an array, integrated by a method."""
         return cls(method, emit.fingerprint(system), system.name, par.tobytes())
 

@@ -37,8 +37,7 @@ from integrators.refusals import as_numbers, check_times
 from integrators.running.digits import check_digits, pairs
 from integrators.running.variations import follow
 from integrators.running.watch import SOON, Bar, Report, Watch, both, identity, read
-from integrators.solution import Solution
-from integrators.solution import made as solution_of
+from integrators.solution import Solution, solution_of
 from problems import limits
 from problems.checks import File, Must, Word, checked_arguments
 from problems.errors import InputError, shown
@@ -185,12 +184,12 @@ def integrate(
         vectors = [np.empty((0, *directions[0].shape))]
     t: list[Array] = []
     y: list[Array] = []
-    made = 0
+    done = 0
     lost: Losses = {}
     here, status, reason, before = problem.t0, Status.FINISHED, "", None
     if kept is not None:
         stepper.restore(kept["stepper"])
-        t, y, made = [kept["t"]], [kept["y"]], kept["made"]
+        t, y, done = [kept["t"]], [kept["y"]], kept["made"]
         here, status, reason, before = kept["here"], kept["status"], kept["reason"], kept["stats"]
         vectors = None if vectors is None else [kept["variations"]]
         lows = None if lows is None else [kept["low"]]
@@ -203,8 +202,8 @@ def integrate(
     if watch is None and sample != "steps" and offers(stepper, TimeLimit):
         stepper.time_limit, length = SOON, np.inf
     try:
-        while made < grid.size and status is Status.FINISHED:
-            piece, how, count = _next_piece(grid, made, here, length, sample, by_steps)
+        while done < grid.size and status is Status.FINISHED:
+            piece, how, count = _next_piece(grid, done, here, length, sample, by_steps)
             began = perf_counter()
             samples = stepper.advance(piece, sample=how)
             length *= _growth(perf_counter() - began)
@@ -218,7 +217,7 @@ def integrate(
                     vectors.append(stepper.variations)
                 if lows is not None:
                     lows.append(stepper.low)
-                made += count if sample == "steps" else samples.t.size
+                done += count if sample == "steps" else samples.t.size
             if watch is not None:
                 stats = stepper.stats.copy() if before is None else both(before, stepper.stats)
                 if watch.due and samples.t.size and sample != "dense" and not acting:
@@ -228,7 +227,7 @@ def integrate(
                     vectors = None if vectors is None else [np.concatenate(vectors)]
                     lows = None if lows is None else [np.concatenate(lows)]
                     watch.keep(
-                        {"stepper": stepper.checkpoint(), "t": t[0], "y": y[0], "made": made, "here": here}
+                        {"stepper": stepper.checkpoint(), "t": t[0], "y": y[0], "made": done, "here": here}
                         | {"status": status, "reason": reason, "stats": stats, "losses": lost}
                         | ({"search": stepper.search.save()} if wanted else {})
                         | ({} if vectors is None else {"variations": vectors[0]})
@@ -334,7 +333,7 @@ def _goes_by_steps(stepper: Any, sample: str | None) -> bool:
 
 
 def _next_piece(
-    grid: Array, made: int, here: float, length: float, sample: str | None, by_steps: bool
+    grid: Array, taken: int, here: float, length: float, sample: str | None, by_steps: bool
 ) -> tuple[Array, str | None, int]:
     """Return the times of the next piece, how to sample them, and how many of the grid they serve.
 
@@ -342,10 +341,10 @@ def _next_piece(
     the next sample. So pieces give the bits of one call of ``advance``.
     """
     sign = 1.0 if grid[-1] >= here else -1.0
-    if length == np.inf or (made == grid.size - 1 and sample != "steps" and not by_steps):
-        return grid[made:], sample, grid.size - made
+    if length == np.inf or (taken == grid.size - 1 and sample != "steps" and not by_steps):
+        return grid[taken:], sample, grid.size - taken
     goal = here + sign * length
-    count = int(np.count_nonzero(sign * (grid[made:] - goal) <= 0.0))
+    count = int(np.count_nonzero(sign * (grid[taken:] - goal) <= 0.0))
     if sample == "steps":
         done = sign * (goal - grid[-1]) >= 0.0
         last = grid[-1] if done else goal
@@ -354,7 +353,7 @@ def _next_piece(
     if count == 0 and by_steps and goal != here:
         return np.array([goal]), "steps", 0
     count = max(count, 1)
-    return grid[made : made + count], sample, count
+    return grid[taken : taken + count], sample, count
 
 
 def _joined(parts: list[Array], *row: int) -> Array:
@@ -371,7 +370,7 @@ def _growth(seconds: float) -> float:
 
 def _with_events(solution: Solution, search: Finder) -> Solution:
     """Return the solution with what a search for events has found, up to where it ended."""
-    end = Ending.of(search, solution.status, solution.reason, solution.problem.t0, solution.t_stop)
+    end = Ending.from_search(search, solution.status, solution.reason, solution.problem.t0, solution.t_stop)
     n = end.count(solution.t, search)
     stats = replace(solution.stats, extra={**solution.stats.extra, "event_search": search.work()})
     return replace(

@@ -177,7 +177,7 @@ def integrate_many(
     reducer = Reducer(system, reduce) if reduce else None
     belongs = identity(problem, method, grid, sample, looked_for, variations) | {
         "start": digest(rows), "parameters": digest(par),
-        "reduce": ", ".join(f"{name} {one.digest}" for name, one in reduce.items()),
+        "reduce": ", ".join(f"{name} {item.digest}" for name, item in reduce.items()),
     }  # fmt: skip
     gathered = Gathered(problem, method, rows, par, grid, sample, reducer, directions)
     path = None if checkpoint is None else Path(checkpoint)
@@ -198,23 +198,23 @@ def integrate_many(
             vectors = along(numbers)
             return integrate_with(program, *given(numbers), problem.t0, threads, sample, vectors), None
         members = follow(start, *given(numbers), problem.t0, threads)
-        return joined([one for one, _ in members], grid), [happened for _, happened in members]
+        return joined([item for item, _ in members], grid), [happened for _, happened in members]
 
     if executor is not None:
         pieces = [
             (numbers, (*given(numbers), problem.t0, threads, sample, along(numbers)))
             for numbers in gathered.missing(cast("int", size))
         ]
-        made = Remote(executor, problem, method, integrate_piece).run(pieces)
+        pieces_ = Remote(executor, problem, method, integrate_piece).run(pieces)
     else:
         batches = start is None and directions is None and in_batches(program, grid, sample)
         few = program.piece if offers(program, PieceSize) else FIRST * threads
         soon = SOON if progress or checkpoint is not None else UNWATCHED
-        made = _local(here, gathered, few if batches else threads, size, soon)
+        pieces_ = _local(here, gathered, few if batches else threads, size, soon)
     began = perf_counter()
     with Bar() if progress is True else nullcontext(progress or None) as report, suppress(KeyboardInterrupt):
-        for numbers, found, happened in made:
-            gathered.take(numbers, found, happened)
+        for numbers, result, happened in pieces_:
+            gathered.take(numbers, result, happened)
             if watch.keeps:
                 watch.keep(gathered.checkpoint())
             if report is not None:
@@ -328,19 +328,19 @@ def _local(
 def _values(system: System, parameters: Any) -> dict[str, Array]:
     """Return parameters as arrays: of all trajectories along the first axis, or those of all."""
     own = system.unpack(system.pack())
-    found: dict[str, Array] = {}
+    by_name: dict[str, Array] = {}
     for name, given in parameters.items():
         if name not in own:
             raise unknown(f"parameter of {system.name}", name, own)
         value = as_numbers(f"values of parameter {name!r}", given)
-        one = np.shape(own[name])
-        if value.ndim not in (len(one), len(one) + 1) or value.shape[value.ndim - len(one) :] != one:
-            wanted = f"(n, {one[0]})" if one else "(n,)"
+        shape = np.shape(own[name])
+        if value.ndim not in (len(shape), len(shape) + 1) or value.shape[value.ndim - len(shape) :] != shape:
+            wanted = f"(n, {shape[0]})" if shape else "(n,)"
             raise InputError(f"parameter {name!r} must have shape {wanted}, not {value.shape}.")
         if not np.isfinite(value).all():
             raise InputError(f"parameter {name!r} must be finite numbers; got {shown(value.tolist())}.")
-        found[name] = value
-    return found
+        by_name[name] = value
+    return by_name
 
 
 def _number(who: str, starts: ArrayLike | None, values: dict[str, Array]) -> tuple[str, int]:

@@ -76,16 +76,16 @@ def alone(
     """
     stop = threading.Event()
 
-    def one(i: int) -> Trajectories:
+    def member(i: int) -> Trajectories:
         along = None if directions is None else (directions[0][i], directions[1][i])
-        return _one(program, starts[i], par[i], own_times(times, i), t0, sample, stop, along)
+        return _single(program, starts[i], par[i], own_times(times, i), t0, sample, stop, along)
 
     if threads == 1 or len(starts) == 1:
-        members = [one(i) for i in range(len(starts))]
+        members = [member(i) for i in range(len(starts))]
     else:
         with ThreadPoolExecutor(threads) as pool:
             try:
-                members = list(pool.map(one, range(len(starts))))
+                members = list(pool.map(member, range(len(starts))))
             except BaseException:
                 stop.set()  # the others come back at once
                 raise
@@ -94,39 +94,41 @@ def alone(
 
 def joined(members: list[Trajectories], times: Array) -> Trajectories:
     """Return batches of one trajectory as one; rows that are shorter than others end with NaN."""
-    width = max(one.y.shape[1] for one in members)
+    width = max(member.y.shape[1] for member in members)
     t, y = (
         np.full((len(members), width), np.nan),
         np.full((len(members), width, members[0].y.shape[2]), np.nan),
     )
-    for i, one in enumerate(members):
-        t[i, : one.t.size], y[i, : one.y.shape[1]] = one.t, one.y[0]
-    shared = np.ndim(times) == 1 and all(one.t is times for one in members)
+    for i, member in enumerate(members):
+        t[i, : member.t.size], y[i, : member.y.shape[1]] = member.t, member.y[0]
+    shared = np.ndim(times) == 1 and all(member.t is times for member in members)
     return Trajectories(
         times if shared else t,
         y,
-        [one.status[0] for one in members],
-        [one.reason[0] for one in members],
-        np.concatenate([one.t_stop for one in members]),
-        np.concatenate([one.steps for one in members]),
-        extra={i: extra for i, one in enumerate(members) for extra in one.extra.values()},
+        [member.status[0] for member in members],
+        [member.reason[0] for member in members],
+        np.concatenate([member.t_stop for member in members]),
+        np.concatenate([member.steps for member in members]),
+        extra={i: extra for i, member in enumerate(members) for extra in member.extra.values()},
         variations=_joined_variations(members, y),
     )
 
 
 def _joined_variations(members: list[Trajectories], y: Array) -> Array | None:
     """Return the variations of batches of one as those of one batch, where they have any."""
-    count = max((one.variations.shape[-1] for one in members if one.variations is not None), default=0)
+    count = max(
+        (member.variations.shape[-1] for member in members if member.variations is not None), default=0
+    )
     if not count:
         return None
     vectors = np.full((*y.shape, count), np.nan)
-    for i, one in enumerate(members):
-        if one.variations is not None:
-            vectors[i, : one.variations.shape[1]] = one.variations[0]
+    for i, member in enumerate(members):
+        if member.variations is not None:
+            vectors[i, : member.variations.shape[1]] = member.variations[0]
     return vectors
 
 
-def _one(
+def _single(
     program: Any,
     y0: Array,
     par: Array,
@@ -159,9 +161,11 @@ def _one(
     end = times[-1] if samples.status is Status.FINISHED else stepper.t
     steps = np.array([stepper.stats.steps])
     vectors = None if along is None else stepper.variations[np.newaxis]
-    made = Trajectories(t, y, [samples.status], [samples.reason], np.array([end]), steps, variations=vectors)
-    made.extra[0] = telling(stepper.stats)
-    return made
+    result = Trajectories(
+        t, y, [samples.status], [samples.reason], np.array([end]), steps, variations=vectors
+    )
+    result.extra[0] = telling(stepper.stats)
+    return result
 
 
 def in_batches(program: Program, times: Array, sample: str | None) -> bool:
@@ -248,28 +252,30 @@ class Gathered:
         """Steps of all."""
         return int(self._steps.sum())
 
-    def take(self, numbers: Numbers, found: Any, events: list[dict[str, Occurrences]] | None = None) -> None:
+    def take(self, numbers: Numbers, result: Any, events: list[dict[str, Occurrences]] | None = None) -> None:
         """Take the trajectories of these numbers, or a text on why there are none."""
-        if isinstance(found, str):
+        if isinstance(result, str):
             for i in numbers.tolist():
-                self._reason[i] = f"its worker ended ({found}); resume it from a checkpoint, or run it again."
+                self._reason[i] = (
+                    f"its worker ended ({result}); resume it from a checkpoint, or run it again."
+                )
             return
         chosen = numbers.tolist()
         if self._reducer is not None:
-            self._reducer.take(numbers, found.t, found.y, self._par[numbers])
-            self._y[numbers] = found.y[:, -1:]
+            self._reducer.take(numbers, result.t, result.y, self._par[numbers])
+            self._y[numbers] = result.y[:, -1:]
         elif self._rows is not None:
-            for i, t, y in zip(chosen, np.broadcast_to(found.t, found.y.shape[:2]), found.y, strict=True):
+            for i, t, y in zip(chosen, np.broadcast_to(result.t, result.y.shape[:2]), result.y, strict=True):
                 there = ~np.isnan(t)
                 self._rows[i] = t[there], y[there]
         else:
-            self._y[numbers, : found.y.shape[1]] = found.y
-        if self._variations is not None and found.variations is not None:
-            self._variations[numbers, : found.variations.shape[1]] = found.variations
-        for i, status, reason in zip(chosen, found.status, found.reason, strict=True):
+            self._y[numbers, : result.y.shape[1]] = result.y
+        if self._variations is not None and result.variations is not None:
+            self._variations[numbers, : result.variations.shape[1]] = result.variations
+        for i, status, reason in zip(chosen, result.status, result.reason, strict=True):
             self._status[i], self._reason[i] = status, reason
-        self._stop[numbers], self._steps[numbers] = found.t_stop, found.steps
-        self._extra.update({chosen[i]: extra for i, extra in found.extra.items() if extra})
+        self._stop[numbers], self._steps[numbers] = result.t_stop, result.steps
+        self._extra.update({chosen[i]: extra for i, extra in result.extra.items() if extra})
         self._events.update(zip(chosen, events or (), strict=False))
 
     _kept = ("_rows", "_y", "_variations", "_status", "_reason", "_stop", "_steps", "_extra", "_events")
@@ -392,7 +398,7 @@ def _received(sent: bytes) -> tuple[Problem, MethodBase]:
 
 def digest(*arrays: Array) -> str:
     """Return a text that tells arrays from others."""
-    found = hashlib.sha256()
+    hash_ = hashlib.sha256()
     for array in arrays:
-        found.update(f"{array.shape}".encode() + np.ascontiguousarray(array).tobytes())
-    return found.hexdigest()
+        hash_.update(f"{array.shape}".encode() + np.ascontiguousarray(array).tobytes())
+    return hash_.hexdigest()

@@ -68,6 +68,6 @@ def section(
     if end == problem.t0:
         raise InputError(f"t_end={end!r} of a section must be another time than t0={problem.t0!r}.")
     event = Event(g, direction=direction, terminal=count or 0, name="section")
-    made = integrate(problem, method, [end], events=event, progress=progress)
-    passages = made.events["section"]
-    return replace(made, t=passages.t, y=passages.y)
+    solution = integrate(problem, method, [end], events=event, progress=progress)
+    passages = solution.events["section"]
+    return replace(solution, t=passages.t, y=passages.y)

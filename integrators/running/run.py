@@ -152,10 +152,10 @@ class Run:
         """What was found in the steps so far, by name."""
         if not self._wanted:
             return {}
-        found = [*self._before, self._stepper.search.hits.occurrences()]
+        parts = [*self._before, self._stepper.search.hits.occurrences()]
 
-        def joined(name: str, what: str) -> Any:
-            return np.concatenate([getattr(one[name], what) for one in found])
+        def joined(name: str, key: str) -> Any:
+            return np.concatenate([getattr(part[name], key) for part in parts])
 
         return {
             name: Occurrences(
@@ -200,8 +200,8 @@ class Run:
         """
         (goal,) = check_times([t], self.t).tolist()
         if self._stepper.status is Status.RUNNING and goal != self.t:
-            made = self._stepper.advance(np.array([goal]))
-            self._shown = (goal, made.y[0]) if made.t.size else None
+            samples = self._stepper.advance(np.array([goal]))
+            self._shown = (goal, samples.y[0]) if samples.t.size else None
         return self.y
 
     def energy(self) -> float:

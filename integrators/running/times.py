@@ -73,14 +73,14 @@ def _check(count: float, h: float) -> None:
         raise InputError(f"h={abs(h)!r} would need {count:.1e} steps; take a larger h.")
 
 
-def _split(times: Any, bases: Any, h: float, of: Any) -> tuple[Any, Any]:
+def _split(times: Any, bases: Any, h: float, functions: Any) -> tuple[Any, Any]:
     """Return counts and parts of numbers or of arrays, with the functions ``of`` them."""
-    count = of.rint((times - bases) / h)
-    _check(of.largest(count), h)
+    count = functions.rint((times - bases) / h)
+    _check(functions.largest(count), h)
     parts = _rest(times, bases, count, h)
-    close = abs(parts) <= 4.0 * of.spacing(of.maximum(abs(times), abs(bases)))
-    count = of.where(close | (parts * h >= 0.0), count, count - 1.0)
-    return count, of.where(close, 0.0, _rest(times, bases, count, h))
+    close = abs(parts) <= 4.0 * functions.spacing(functions.maximum(abs(times), abs(bases)))
+    count = functions.where(close | (parts * h >= 0.0), count, count - 1.0)
+    return count, functions.where(close, 0.0, _rest(times, bases, count, h))
 
 
 def _rest(times: Any, bases: Any, count: Any, h: float) -> Any:

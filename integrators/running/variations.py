@@ -116,11 +116,11 @@ def _slope(problem: Problem, y0: Array, par: Array) -> Array:
 
 def places(problem: Problem) -> dict[str, slice]:
     """Return where each parameter lies in the parameter vector."""
-    found, end = {}, 0
+    slices, end = {}, 0
     for name, value in problem.system.parameters.items():
         start, end = end, end + np.size(value)
-        found[name] = slice(start, end)
-    return found
+        slices[name] = slice(start, end)
+    return slices
 
 
 def follow(

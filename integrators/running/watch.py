@@ -122,8 +122,8 @@ class Watch:
             way = (t - self._t0) / (self._end - self._t0) if self._end != self._t0 else 1.0
             fraction = min(max(way, 0.0), 1.0)
             self._first = fraction if self._first is None else self._first
-            seconds, made = now - self._began, fraction - self._first
-            left = seconds * (1.0 - fraction) / made if made > 0.0 else float("inf")
+            seconds, progress = now - self._began, fraction - self._first
+            left = seconds * (1.0 - fraction) / progress if progress > 0.0 else float("inf")
             self._report(Progress(t, fraction, steps, seconds, left))
 
     def write(self) -> None:
@@ -186,11 +186,11 @@ def read(path: str | os.PathLike[str], wanted: Mapping[str, str]) -> dict[str, A
     try:
         magic, head, digest, kept = Path(path).read_bytes().split(b"\n", 3)
         whole = magic.startswith(MAGIC) and hashlib.sha256(kept).hexdigest().encode() == digest
-        found, version = (json.loads(head), int(magic.removeprefix(MAGIC))) if whole else ({}, 0)
+        stored, version = (json.loads(head), int(magic.removeprefix(MAGIC))) if whole else ({}, 0)
     except FileNotFoundError:
         raise InputError(f"there is no checkpoint {where} to resume; leave out resume=.") from None
     except (OSError, ValueError):
-        whole, found, kept, version = False, {}, b"", 0
+        whole, stored, kept, version = False, {}, b"", 0
     if not whole:
         raise InputError(f"{where} is not a checkpoint of integrate, or is damaged; leave out resume=.")
     if version not in READERS:
@@ -198,11 +198,11 @@ def read(path: str | os.PathLike[str], wanted: Mapping[str, str]) -> dict[str, A
             f"{where} is a checkpoint of format {version}, and this version reads "
             f"{' and '.join(map(str, READERS))}; resume it with the version that wrote it."
         )
-    for what, value in wanted.items():
-        if found.get(what) != value:
-            other = f"{found.get('method')} on {found.get('problem')}"
+    for key, value in wanted.items():
+        if stored.get(key) != value:
+            other = f"{stored.get('method')} on {stored.get('problem')}"
             raise InputError(
-                f"{where} is a checkpoint of {other}, with other {what} than here ({shown(value)}); "
+                f"{where} is a checkpoint of {other}, with other {key} than here ({shown(value)}); "
                 "resume that integration, or leave out resume=."
             )
     return READERS[version](_Unpickler(io.BytesIO(kept)).load())

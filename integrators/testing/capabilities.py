@@ -144,14 +144,15 @@ def finds_events_beside_its_steps(method: MethodBase, problem: Problem) -> str |
     solution = integrate(problem, method, grid, events=Event(crossing, name="crossing"))
     change = float(np.max(np.abs(solution.y - plain.y)))
     require(change < ROUNDING, f"events change no sample, but by {change:.1e}")
-    found = solution.events["crossing"]
-    require(found.t.size > 0, "an event that happens is found")
+    crossings = solution.events["crossing"]
+    require(crossings.t.size > 0, "an event that happens is found")
     there = [
-        abs(float(y[0]) - level - 1e-3 * (t - problem.t0)) for t, y in zip(found.t, found.y, strict=True)
+        abs(float(y[0]) - level - 1e-3 * (t - problem.t0))
+        for t, y in zip(crossings.t, crossings.y, strict=True)
     ]
     require(max(there) < EVENT_BOUND, f"the function vanishes at its events, but: {max(there):.1e}")
     ended = integrate(problem, method, grid, events=Event(crossing, name="crossing", terminal=True))
-    require(ended.status is Status.EVENT and ended.t_stop == found.t[0], "a terminal event ends it")
+    require(ended.status is Status.EVENT and ended.t_stop == crossings.t[0], "a terminal event ends it")
     return None
 
 
@@ -166,9 +167,11 @@ def events_may_change_the_state(method: MethodBase, problem: Problem) -> str | N
     event = Event(lambda y: y[0] - level, then=lambda y: [y[i] for i in range(problem.y0.size)], name="same")
     solution = integrate(problem, method, grid, events=event)
     require(solution.status is Status.FINISHED, f"it goes on after an action, but: {solution.reason}")
-    found: Any = solution.events["same"]
-    require(found.t.size > 0, "an event that happens is found")
-    require(np.array_equal(found.after, found.y), "the state after an event is what its action returns")
+    crossings: Any = solution.events["same"]
+    require(crossings.t.size > 0, "an event that happens is found")
+    require(
+        np.array_equal(crossings.after, crossings.y), "the state after an event is what its action returns"
+    )
     change = float(np.max(np.abs(solution.y - plain.y)))
     require(change < ACTION_BOUND, f"an action that changes nothing changes no state, but by {change:.1e}")
     return None
@@ -195,12 +198,12 @@ def comes_back_after_its_time(method: MethodBase, problem: Problem) -> str | Non
         return "it has no limit of time"
     grid = irregular(problem)
     whole = start(method, problem).advance(grid)
-    stepper.time_limit, made = 0.0, 0
-    while made < grid.size:
-        piece = stepper.advance(grid[made:])
+    stepper.time_limit, done = 0.0, 0
+    while done < grid.size:
+        piece = stepper.advance(grid[done:])
         require(piece.status is Status.FINISHED and piece.t.size > 0, "each piece has a sample")
-        require(np.array_equal(piece.y, whole.y[made : made + piece.t.size]), "pieces have the bits of one")
-        made += piece.t.size
+        require(np.array_equal(piece.y, whole.y[done : done + piece.t.size]), "pieces have the bits of one")
+        done += piece.t.size
     return None
 
 
@@ -244,9 +247,9 @@ def adjoints_are_what_tangents_say(method: MethodBase, problem: Problem) -> str 
         tapes.append(stepper.recorder(FEW))
         stepper.record(tapes[-1])
         stepper.march(end, FEW)
-    made = stepper.advance([end])
+    samples = stepper.advance([end])
     plain = followed.advance([end])
-    require(np.array_equal(made.y, plain.y), "the trajectory is bitwise identical when it is recorded")
+    require(np.array_equal(samples.y, plain.y), "the trajectory is bitwise identical when it is recorded")
     adjoint = stepper.adjoint(parameters=False)
     adjoint.begin(np.eye(dim)[0])
     for records in reversed(tapes):
@@ -319,11 +322,11 @@ def pairs_hold_twice_the_digits(method: MethodBase, problem: Problem) -> str | N
         require(offers(stepper, LowParts), "what start_pairs starts has low parts")
         here = stepper.advance(np.array([problem.t0]))
         require(np.array_equal(np.stack([here.y[0], stepper.low[0]], axis=1), pairs), "a start is a sample")
-        made = stepper.advance(grid)
-        require(stepper.low.shape == made.y.shape, "low has the shape of the samples")
-        nearest = np.abs(stepper.low) <= 0.5 * np.spacing(np.abs(made.y))
+        samples = stepper.advance(grid)
+        require(stepper.low.shape == samples.y.shape, "low has the shape of the samples")
+        nearest = np.abs(stepper.low) <= 0.5 * np.spacing(np.abs(samples.y))
         require(bool(nearest.all()), "samples are the nearest doubles")
-        ends.append((made.y[-1], stepper.low[-1]))
+        ends.append((samples.y[-1], stepper.low[-1]))
     moved = (ends[1][0] - ends[0][0]) + (ends[1][1] - ends[0][1])
     miss, size = float(np.max(np.abs(moved))), float(np.max(np.abs(problem.y0)))
     require(0.0 < miss < MOVED * size, f"the low part of a start moves the end, but by {miss:.1e}")

@@ -66,11 +66,11 @@ def refuses_other_checkpoints(method: MethodBase, problem: Problem) -> str | Non
         twice = program.start(problem.y0, problem.par * 2.0, problem.t0)
         others["that of other parameters"] = twice.checkpoint()
     there = (stepper.t, stepper.y, stepper.status)
-    for what, checkpoint in others.items():
-        raises(InputError, lambda c=checkpoint: stepper.restore(c), f"{what} is refused as a checkpoint")
+    for label, checkpoint in others.items():
+        raises(InputError, lambda c=checkpoint: stepper.restore(c), f"{label} is refused as a checkpoint")
         require(
             (stepper.t, stepper.status) == (there[0], there[2]) and np.array_equal(stepper.y, there[1]),
-            f"the refusal of {what} leaves the stepper where it was",
+            f"the refusal of {label} leaves the stepper where it was",
         )
     twin = start(method, problem)
     twin.advance(grid[:7])

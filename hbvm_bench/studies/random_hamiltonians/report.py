@@ -52,19 +52,19 @@ def parts(*, quick: bool) -> list[Part]:
     methods = QUICK_METHODS if quick else METHODS
     tasks = [Task(f"of {i}", partial(outcomes, list(piece), methods)) for i, piece in enumerate(pieces)]
 
-    def blocks(found: Results) -> list[Maker]:
-        made = [one for i in range(len(pieces)) for one in found[f"of {i}"]]
+    def blocks(results: Results) -> list[Maker]:
+        outcomes = [outcome for i in range(len(pieces)) for outcome in results[f"of {i}"]]
         return [
-            ("how often", lambda: wrong(made, position, "position", POSITION)),
-            ("the picture", lambda: picture(made)),
-            ("the energy", lambda: wrong(made, energy, "energy", ENERGY)),
-            ("the endings", lambda: endings(made)),
-            ("the families", lambda: families(made)),
-            ("what is left out", lambda: left_out(made)),
+            ("how often", lambda: wrong(outcomes, position, "position", POSITION)),
+            ("the picture", lambda: picture(outcomes)),
+            ("the energy", lambda: wrong(outcomes, energy, "energy", ENERGY)),
+            ("the endings", lambda: endings(outcomes)),
+            ("the families", lambda: families(outcomes)),
+            ("what is left out", lambda: left_out(outcomes)),
             ("how", lambda: Note(HOW)),
         ]
 
-    return [Part("trials", "Errors behind a success", tasks, lambda found: [], blocks)]
+    return [Part("trials", "Errors behind a success", tasks, lambda results: [], blocks)]
 
 
 def compute(store: Store, jobs: int, tell: Callable[[str], None]) -> None:
@@ -96,20 +96,20 @@ def energy(outcome: Outcome, trial: Trial) -> float:
     return trial.energy / TOLERANCE
 
 
-def counted(made: Sequence[Outcome], method: str, judge: Judge) -> tuple[int, list[float]]:
+def counted(outcomes: Sequence[Outcome], method: str, judge: Judge) -> tuple[int, list[float]]:
     """Return how many problems a method was judged on, and the factors of those that it says it solved.
 
     A failure that was reported, and a process that had to be ended, counts as judged and is not wrong.
     """
     asked = [
-        (one, trial)
-        for one in made
-        for trial in one.trials
-        if trial.method == method and trial.status != REFUSED and one.end
+        (outcome, trial)
+        for outcome in outcomes
+        for trial in outcome.trials
+        if trial.method == method and trial.status != REFUSED and outcome.end
     ]
-    known = [(one, judge(one, trial), trial.success) for one, trial in asked]
+    known = [(outcome, judge(outcome, trial), trial.success) for outcome, trial in asked]
     factors = [factor for _, factor, success in known if success and not np.isnan(factor)]
-    failed = sum(not success and _judges(one, judge) for one, _, success in known)
+    failed = sum(not success and _judges(outcome, judge) for outcome, _, success in known)
     return len(factors) + failed, factors
 
 
@@ -128,43 +128,43 @@ def share(count: int, total: int) -> str:
     return f"{count} of {total}: {count / total:.1%} [{100 * low:.1f}, {100 * high:.1f}]"
 
 
-def wrong(made: Sequence[Outcome], judge: Judge, what: str, note: str) -> Table:
+def wrong(outcomes: Sequence[Outcome], judge: Judge, quantity: str, note: str) -> Table:
     """Return how often each method reports success beyond each of the factors."""
     rows = []
     for method in METHODS:
-        total, factors = counted(made, method, judge)
+        total, factors = counted(outcomes, method, judge)
         rows.append(
             (
                 method,
-                *(share(sum(one > factor for one in factors), total) for factor in FACTORS),
+                *(share(sum(outcome > factor for outcome in factors), total) for factor in FACTORS),
                 f"{median(factors):.1g}" if factors else NONE,
                 f"{max(factors):.1g}" if factors else NONE,
             )
         )
     heads = tuple(f"> {factor:g} times" for factor in FACTORS)
     return Table(
-        f"Success reported, {what} wrong",
+        f"Success reported, {quantity} wrong",
         ("method", *heads, "median", "largest"),
         rows,
         note,
-        key=f"random-{what}",
+        key=f"random-{quantity}",
     )
 
 
 @drawn("random-factors", "Errors behind a success", WIDTH, 5.0)
-def picture(figure: Figure, made: Sequence[Outcome]) -> Said:
+def picture(figure: Figure, outcomes: Sequence[Outcome]) -> Said:
     """Draw the share of problems by the factor that their error exceeds."""
     axes = figure.subplots()
     said = []
     dashes = ("-", (0, (5, 2)), (0, (1, 1.5)))
     for i, method in enumerate(METHODS):
-        total, factors = counted(made, method, position)
+        total, factors = counted(outcomes, method, position)
         if not factors:
             continue
         x = np.sort(np.maximum(factors, 1e-8))
         y = np.arange(len(x), 0, -1) / total
         axes.step(x, y, where="post", label=method, color=f"C{i % 10}", linestyle=dashes[i // 10], lw=1.3)
-        said.append(f"{method}: {sum(one > FACTORS[0] for one in factors)} of {total}")
+        said.append(f"{method}: {sum(outcome > FACTORS[0] for outcome in factors)} of {total}")
     for factor in FACTORS:
         axes.axvline(factor, color=MUTED, linewidth=0.8, linestyle=(0, (4, 3)))
     axes.axvline(1.0, color=INK, linewidth=0.9)
@@ -182,13 +182,13 @@ def picture(figure: Figure, made: Sequence[Outcome]) -> Said:
     )
 
 
-def endings(made: Sequence[Outcome]) -> Table:
+def endings(outcomes: Sequence[Outcome]) -> Table:
     """Return how the integrations ended, and their times."""
     rows = []
-    solved = [one for one in made if one.end]
+    solved = [outcome for outcome in outcomes if outcome.end]
     for method in METHODS:
-        found = [trial for one in solved for trial in one.trials if trial.method == method]
-        ran = [trial for trial in found if trial.status != REFUSED]
+        ended = [trial for outcome in solved for trial in outcome.trials if trial.method == method]
+        ran = [trial for trial in ended if trial.status != REFUSED]
         other = [trial for trial in ran if not trial.success]
         hung = sum(trial.status in (NO_ANSWER, CRASHED) for trial in other)
         times = [trial.seconds for trial in ran if trial.success]
@@ -196,7 +196,7 @@ def endings(made: Sequence[Outcome]) -> Table:
             (
                 method,
                 f"{len(ran)}",
-                f"{len(found) - len(ran)}" if len(found) > len(ran) else NONE,
+                f"{len(ended) - len(ran)}" if len(ended) > len(ran) else NONE,
                 share(len(other) - hung, len(ran)),
                 f"{hung}" if hung else NONE,
                 in_words(median(times)) if times else NONE,
@@ -215,7 +215,7 @@ def endings(made: Sequence[Outcome]) -> Table:
     )
 
 
-def families(made: Sequence[Outcome]) -> Table:
+def families(outcomes: Sequence[Outcome]) -> Table:
     """Return by family how many positions are wrong."""
     factor = FACTORS[1]
     rows = []
@@ -223,9 +223,9 @@ def families(made: Sequence[Outcome]) -> Table:
         cells = []
         for family in FAMILIES:
             total, factors = counted(
-                [one for one in made if family_of(one.number) == family], method, position
+                [outcome for outcome in outcomes if family_of(outcome.number) == family], method, position
             )
-            cells.append(f"{sum(one > factor for one in factors)} of {total}" if total else NONE)
+            cells.append(f"{sum(outcome > factor for outcome in factors)} of {total}" if total else NONE)
         rows.append((method, *cells))
     return Table(
         f"Success reported, position wrong by more than {factor:g} times, by family",
@@ -236,17 +236,17 @@ def families(made: Sequence[Outcome]) -> Table:
     )
 
 
-def left_out(made: Sequence[Outcome]) -> Items:
+def left_out(outcomes: Sequence[Outcome]) -> Items:
     """Return which problems are not judged, and what was reported on those without a reference."""
     said = []
-    for one in made:
-        arrived = [trial.method for trial in one.trials if trial.success]
-        name = f"problem {one.number} ({family_of(one.number)})"
-        if not one.end:
+    for outcome in outcomes:
+        arrived = [trial.method for trial in outcome.trials if trial.success]
+        name = f"problem {outcome.number} ({family_of(outcome.number)})"
+        if not outcome.end:
             who = ", ".join(arrived) or "by none"
-            said.append(f"{name} has no reference: {one.why.rstrip('.')}. Success reported: {who}.")
-        elif not one.judged:
-            said.append(f"{name}: condition number {one.condition:.1e}; positions are not judged.")
+            said.append(f"{name} has no reference: {outcome.why.rstrip('.')}. Success reported: {who}.")
+        elif not outcome.judged:
+            said.append(f"{name}: condition number {outcome.condition:.1e}; positions are not judged.")
     return Items(said or ["All problems are judged."])
 
 

@@ -41,11 +41,11 @@ class Drawn:
 
 
 def _kinetic(p: Any) -> Any:
-    return sum(one**2 for one in p) / 2
+    return sum(momentum**2 for momentum in p) / 2
 
 
 def _squares(q: Any) -> Any:
-    return sum(one**2 for one in q)
+    return sum(coordinate**2 for coordinate in q)
 
 
 def _span(random: Random, low: float = 20.0, high: float = 60.0) -> float:
@@ -59,11 +59,11 @@ def _powers(random: Random, dof: int, count: int) -> list[tuple[int, ...]]:
 
 
 def _monomial(q: Any, powers: tuple[int, ...]) -> Any:
-    made = 1.0
-    for one, power in zip(q, powers, strict=True):
+    product = 1.0
+    for coordinate, power in zip(q, powers, strict=True):
         if power:
-            made = one**power * made
-    return made
+            product = coordinate**power * product
+    return product
 
 
 def polynomial(random: Random) -> Drawn:
@@ -77,7 +77,7 @@ def polynomial(random: Random) -> Drawn:
 
     def numbers(random: Random) -> tuple[Any, Any, Any, float]:
         c = random.uniform(-1.0, 1.0, len(terms))
-        quartic = sum(abs(one) for one, powers in zip(c, terms, strict=True) if sum(powers) == 4)
+        quartic = sum(abs(value) for value, powers in zip(c, terms, strict=True) if sum(powers) == 4)
         c = [*c, quartic + random.uniform(0.1, 0.5)]  # so that no trajectory escapes
         return c, random.uniform(-1.2, 1.2, dof), random.uniform(-1.0, 1.0, dof), _span(random)
 
@@ -93,7 +93,7 @@ def trigonometric(random: Random) -> Drawn:
     def H(q, p, par, m):
         potential = 0.0
         for i, wave in enumerate(waves):
-            angle = sum(k * one for k, one in zip(wave, q, strict=True) if k)
+            angle = sum(k * coordinate for k, coordinate in zip(wave, q, strict=True) if k)
             potential = potential - par.c[2 * i] * m.cos(angle + par.c[2 * i + 1])
         return _kinetic(p) + potential
 
@@ -111,17 +111,17 @@ def central(random: Random) -> Drawn:
 
     def H(q, p, par, m):
         r2 = _squares(q)
-        made = _kinetic(p) + (m.log(r2) / 2 if logarithm else -1.0 / m.sqrt(r2))
+        total = _kinetic(p) + (m.log(r2) / 2 if logarithm else -1.0 / m.sqrt(r2))
         if added == "inverse cube":
-            return made - par.c[0] / (r2 * m.sqrt(r2))
+            return total - par.c[0] / (r2 * m.sqrt(r2))
         if added == "field":
-            return made + par.c[0] * q[0]
+            return total + par.c[0] * q[0]
         if added == "anisotropic":
-            return made + par.c[0] * p[0] ** 2
+            return total + par.c[0] * p[0] ** 2
         if added == "second centre":
             away = (q[0] - 3.0) ** 2 + _squares(q[1:])
-            return made - par.c[0] / m.sqrt(away)
-        return made + par.c[0] * r2
+            return total - par.c[0] / m.sqrt(away)
+        return total + par.c[0] * r2
 
     def numbers(random: Random) -> tuple[Any, Any, Any, float]:
         c = [random.uniform(1e-3, 0.05)]
@@ -165,20 +165,20 @@ def lattice(random: Random) -> Drawn:
     site = str(random.choice(["none", "quartic", "cosine"]))
 
     def H(q, p, par, m):
-        made = _kinetic(p)
+        total = _kinetic(p)
         for i in range(n):
             r = q[(i + 1) % n] - q[i]
             if spring == "quartic":
-                made = made + r**2 / 2 + par.c[0] * r**3 / 3 + par.c[1] * r**4 / 4
+                total = total + r**2 / 2 + par.c[0] * r**3 / 3 + par.c[1] * r**4 / 4
             elif spring == "exponential":
-                made = made + m.exp(par.c[1] * r) - par.c[1] * r
+                total = total + m.exp(par.c[1] * r) - par.c[1] * r
             else:
-                made = made + 1.0 - m.cos(par.c[1] * r)
+                total = total + 1.0 - m.cos(par.c[1] * r)
             if site == "quartic":
-                made = made + par.c[2] * q[i] ** 2 / 2 + par.c[2] * q[i] ** 4 / 4
+                total = total + par.c[2] * q[i] ** 2 / 2 + par.c[2] * q[i] ** 4 / 4
             elif site == "cosine":
-                made = made - par.c[2] * m.cos(q[i])
-        return made
+                total = total - par.c[2] * m.cos(q[i])
+        return total
 
     def numbers(random: Random) -> tuple[Any, Any, Any, float]:
         c = [random.uniform(-0.5, 0.5), random.uniform(0.5, 1.0), random.uniform(0.1, 1.0)]
@@ -196,10 +196,10 @@ def driven(random: Random) -> Drawn:
 
     def H(t, q, p, par, m):
         force = sum(par.c[2 + 2 * i] * m.cos(par.c[3 + 2 * i] * t) for i in range(waves))
-        rest = [-m.cos(one) if angle else one**4 / 4 - one**2 / 2 for one in q]
+        rest = [-m.cos(term) if angle else term**4 / 4 - term**2 / 2 for term in q]
         couple = par.c[0] * _monomial(q, (1,) * dof) if dof > 1 and not angle else 0.0
         first = (1.0 + force) * rest[0] if parametric else rest[0] - force * q[0]
-        return _kinetic(p) + first + sum(par.c[1] * one for one in rest[1:]) + couple
+        return _kinetic(p) + first + sum(par.c[1] * term for term in rest[1:]) + couple
 
     def numbers(random: Random) -> tuple[Any, Any, Any, float]:
         forces = np.stack([random.uniform(0.05, 0.5, waves), random.uniform(0.5, 5.0, waves)], 1)
@@ -215,21 +215,21 @@ def particles(random: Random) -> Drawn:
     force = str(random.choice(["Lennard-Jones", "Morse", "screened", "softened"]))
 
     def H(q, p, par, m):
-        made = _kinetic(p) + par.c[0] * _squares(q)
+        total = _kinetic(p) + par.c[0] * _squares(q)
         for i, j in itertools.combinations(range(n), 2):
             r2 = (q[2 * i] - q[2 * j]) ** 2 + (q[2 * i + 1] - q[2 * j + 1]) ** 2
             if force == "Lennard-Jones":
                 s = 1.0 / r2**3
-                made = made + par.c[1] * (s * s - 2.0 * s)
+                total = total + par.c[1] * (s * s - 2.0 * s)
             elif force == "Morse":
                 away = m.exp(-2.0 * (m.sqrt(r2) - 1.0))
-                made = made + par.c[1] * (away * away - 2.0 * away)
+                total = total + par.c[1] * (away * away - 2.0 * away)
             elif force == "screened":
                 r = m.sqrt(r2)
-                made = made + par.c[1] * m.exp(-par.c[2] * r) / r
+                total = total + par.c[1] * m.exp(-par.c[2] * r) / r
             else:
-                made = made - par.c[1] / m.sqrt(r2 + par.c[2] ** 2 / 25.0)
-        return made
+                total = total - par.c[1] / m.sqrt(r2 + par.c[2] ** 2 / 25.0)
+        return total
 
     def numbers(random: Random) -> tuple[Any, Any, Any, float]:
         c = [random.uniform(0.01, 0.1), random.uniform(0.5, 2.0), random.uniform(0.2, 1.0)]
@@ -251,18 +251,18 @@ def stiff(random: Random) -> Drawn:
     coupling = str(random.choice(["square", "cosine", "product"]))
 
     def H(q, p, par, m):
-        made = _kinetic(p)
+        total = _kinetic(p)
         for i in range(slow):
-            made = made + q[i] ** 2 / 2 + par.c[0] * q[i] ** 4
+            total = total + q[i] ** 2 / 2 + par.c[0] * q[i] ** 4
         for j in range(slow, slow + fast):
-            made = made + (par.c[j - slow + 1] * q[j]) ** 2 / 2
+            total = total + (par.c[j - slow + 1] * q[j]) ** 2 / 2
             if coupling == "square":
-                made = made + q[0] ** 2 * q[j] ** 2 * par.c[1]
+                total = total + q[0] ** 2 * q[j] ** 2 * par.c[1]
             elif coupling == "cosine":
-                made = made + m.cos(q[0] + q[j])
+                total = total + m.cos(q[0] + q[j])
             else:
-                made = made + q[0] ** 2 * q[j]
-        return made
+                total = total + q[0] ** 2 * q[j]
+        return total
 
     def numbers(random: Random) -> tuple[Any, Any, Any, float]:
         frequencies = 10.0 ** random.uniform(1.0, 2.0, fast)
@@ -307,11 +307,13 @@ def problem(number: int) -> Problem:
         From 0 to ``COUNT - 1``; `DRAWS` problems in a row have one formula.
     """
     formula, draw = divmod(number, DRAWS)
-    drawn, made = _formula(formula)
+    drawn, system = _formula(formula)
     random = np.random.default_rng([SEED, formula // FORMULAS, formula % FORMULAS, 1 + draw])
     c, q0, p0, t_end = drawn.numbers(random)
     c = np.round(np.asarray(c, dtype=float), 6).tolist()
-    if not made:
-        made[0] = Hamiltonian(drawn.H, dof=drawn.dof, parameters={"c": c}, name=f"random_{formula}")
+    if not system:
+        system[0] = Hamiltonian(drawn.H, dof=drawn.dof, parameters={"c": c}, name=f"random_{formula}")
     start = {"q0": np.round(q0, 6), "p0": np.round(p0, 6)}
-    return Problem(made[0], **start, parameters={"c": c}, t_end=t_end, title=f"{family_of(number)}, {number}")
+    return Problem(
+        system[0], **start, parameters={"c": c}, t_end=t_end, title=f"{family_of(number)}, {number}"
+    )

@@ -134,7 +134,7 @@ def outcomes(
         Seconds for each integration. A process that takes longer is ended: the integration has given no
         answer, and another process goes on with the next.
     """
-    made = {number: Outcome(number, why="not computed") for number in numbers}
+    results = {number: Outcome(number, why="not computed") for number in numbers}
     left = [
         (number, method)
         for number in numbers
@@ -142,18 +142,18 @@ def outcomes(
         if method != SLOW or number % systems.DRAWS < SLOW_DRAWS
     ]
     while left:
-        for answer in _answers(left, made, limit):
+        for answer in _answers(left, results, limit):
             number, method = left.pop(0)
-            one = made[number]
+            result = results[number]
             if isinstance(answer, Outcome):
-                made[number] = answer
+                results[number] = answer
             elif isinstance(answer, Trial):
-                made[number] = replace(one, trials=[*one.trials, answer])
+                results[number] = replace(result, trials=[*result.trials, answer])
             elif method == REFERENCE:
-                made[number] = replace(one, why=f"the reference: {answer}")
+                results[number] = replace(result, why=f"the reference: {answer}")
             else:
-                made[number] = replace(one, trials=[*one.trials, Trial(method, answer)])
-    return list(made.values())
+                results[number] = replace(result, trials=[*result.trials, Trial(method, answer)])
+    return list(results.values())
 
 
 def _answers(

@@ -38,9 +38,9 @@ def copy_stages(source, source_block, target, target_block, count, calls):
 
 
 @compiled
-def record(what, address, place):
+def record(event, address, place):
     """Keep a solved step, or partial step; `integrators.kernel.context.Context.follow`."""
-    if what not in (STEP, PART_END):
+    if event not in (STEP, PART_END):
         return DONE
     ctx, tape = context(address), tape_at(place)
     if tape.count == tape.capacity:
@@ -73,7 +73,7 @@ def add_slopes(ctx, memory, h):
             total = 0.0
             for i in range(used):
                 total += ctx.tables.weights[lanes * call + i] * values[lanes * p + i]
-            memory.found[p], low = two_sum(memory.found[p], h * total)
+            memory.sums[p], low = two_sum(memory.sums[p], h * total)
             memory.lost[p] += low
 
 

@@ -47,14 +47,14 @@ class Records:
     def read(self) -> tuple[Array, Array, Array]:
         """Return heads (n, HEAD), stages (n, rows, k) and states at the starts (n, dim)."""
         shape, c = self.shape, self.shape.constants
-        found = self.tape.records.reshape(-1, self.tape.size)[: len(self)]
+        rows = self.tape.records.reshape(-1, self.tape.size)[: len(self)]
         calls = _calls(shape)
         end = HEAD + calls * shape.rows * c.lanes
-        stages = found[:, HEAD:end].reshape(-1, calls, shape.rows, c.lanes).swapaxes(1, 2)
+        stages = rows[:, HEAD:end].reshape(-1, calls, shape.rows, c.lanes).swapaxes(1, 2)
         return (
-            found[:, :HEAD],
+            rows[:, :HEAD],
             stages.reshape(len(self), shape.rows, -1)[..., : c.k],
-            found[:, end:][:, : shape.dim],
+            rows[:, end:][:, : shape.dim],
         )
 
 
@@ -98,10 +98,10 @@ class Adjoint:
         if c.route != tables.THROUGH:
             fixed["raw_matrix"] = tables.rounded(self._constants)
         fixed["extrapolation"] = tables.extrapolations(c) if c.route > tables.THROUGH else aligned(0)
-        self.context = made = Context(own, fixed, {"padded": 2 * (-(-dim // 8) * 8)})
-        made.solver.tolerance, made.solver.log_rest, made.varying = TOLERANCE, LOG_REST_VARYING, 1
-        made.solver.rate = FIRST_RATE
-        made.par[:] = par
+        self.context = context = Context(own, fixed, {"padded": 2 * (-(-dim // 8) * 8)})
+        context.solver.tolerance, context.solver.log_rest, context.varying = TOLERANCE, LOG_REST_VARYING, 1
+        context.solver.rate = FIRST_RATE
+        context.par[:] = par
         self._wanted = parameters and system.n_par > 0
         wanted = system.n_par if self._wanted else 0
         self._memory = Pullback({"parameters": wanted, "room": wanted * c.lanes, "states": dim}, {})
@@ -178,13 +178,13 @@ class Adjoint:
         if self._wanted:
             at = np.concatenate([solved.T, stages])
             slopes = emit.numpy(self._system, self._system.product("parameters"))(times, at, self._par)
-            self._memory.found[:] += h * (slopes @ weights)
+            self._memory.sums[:] += h * (slopes @ weights)
 
     @property
     def gradient(self) -> tuple[Array, Array]:
         """The derivatives with respect to the state now, and to the parameters."""
         memory = self._memory
-        return self.context.read(), memory.found + memory.lost
+        return self.context.read(), memory.sums + memory.lost
 
 
 def _matrix(constants: tables.Constants) -> Array:

@@ -27,5 +27,5 @@ class Pullback(Memory):
     parameters = Integer()
     values = Array("room")  # of these products, in one block of stages
     room = Integer()
-    found = Array("parameters")  # the derivatives by parameters,
+    sums = Array("parameters")  # the derivatives by parameters,
     lost = Array("parameters")  # and what they lack

@@ -64,10 +64,10 @@ class Control:
 
     def all(self, *conditions: Any) -> Any:
         """Return where all conditions hold."""
-        found = conditions[0]
-        for one in conditions[1:]:
-            found = self.w.b.and_(found, one)
-        return found
+        result = conditions[0]
+        for condition in conditions[1:]:
+            result = self.w.b.and_(result, condition)
+        return result
 
     def judge(self) -> None:
         """Set `error`, `defect`, where blocks are `certain` and `visible`; see `estimate`."""
@@ -98,12 +98,12 @@ class Control:
                 scale = slope = gamma_error = gamma_last = gap = w.zero
                 for i in range(width):
                     d = w.at(start, 1, i)
-                    found, start_value, end_value = self.coefficients(d)
+                    gammas, start_value, end_value = self.coefficients(d)
                     low, high, own, here, last = rules.judged(
-                        *found, self.number("error_decay"), self.number("defect_decay")
+                        *gammas, self.number("error_decay"), self.number("defect_decay")
                     )
                     note(doubtful, rules.is_doubtful(low, high, self.number("doubt")))
-                    note(changing, rules.changes(low, high, found[GAMMA_0]))
+                    note(changing, rules.changes(low, high, gammas[GAMMA_0]))
                     moved = w.get(w.state, w.at(1, w.form.rows, d) if w.form.second else d).absolute()
                     scale, slope = greatest(scale, moved + self.h * own), greatest(slope, own)
                     gamma_error, gamma_last = greatest(gamma_error, here), greatest(gamma_last, last)
@@ -122,7 +122,7 @@ class Control:
             def compare(block: Any, first: int = first, width: int = width, tops: Any = (top, steep)) -> None:
                 start = w.at(block, width, first)
                 scale, slope, gamma_error, gamma_last = (w.get(getattr(w, name), start) for name in MEASURED)
-                mass = w.one / self.speed(start)
+                mass = w.unity / self.speed(start)
                 scale = rules.size_in_step(scale, tops[0] * mass)
                 slope = rules.slope_beside(slope, tops[1] * mass, self.number("least_slope"))
                 for gamma, worst in ((gamma_error, error), (gamma_last, defect)):
@@ -139,9 +139,9 @@ class Control:
         """Return the velocity by momentum of row d, as `Blocks.speed`."""
         w = self.w
         if not w.form.second:
-            return w.one
+            return w.unity
         speed = w.get(w.velocity, d).absolute()
-        return where(speed > 0.0, speed, w.one)
+        return where(speed > 0.0, speed, w.unity)
 
     def coefficients(self, d: Any) -> tuple[list[Value], Value, Value]:
         """Return what row d is judged by, and keep its polynomial for the first values of the next step.
@@ -154,17 +154,17 @@ class Control:
             The polynomial at both ends of the step.
         """
         w, form = self.w, self.w.form
-        found = self.modes(d)
+        sums = self.modes(d)
         ends = [w.zero, w.zero]  # at the end what polynomials of even degree contribute, and of odd degree
-        for j, coefficient in enumerate(found):
+        for j, coefficient in enumerate(sums):
             ends[j % 2] = coefficient.fma(sqrt(2 * j + 1), ends[j % 2])
         for power, factors in enumerate(in_powers(form.k)):
             total = w.zero
-            for coefficient, factor in zip(found[power::2], factors, strict=True):
+            for coefficient, factor in zip(sums[power::2], factors, strict=True):
                 total = coefficient.fma(factor, total)
             w.put(total, w.ahead, w.at(power, form.rows, d))
         even, odd = ends
-        return [found[j].absolute() for j in form.judged], even - odd, even + odd
+        return [sums[j].absolute() for j in form.judged], even - odd, even + odd
 
     def modes(self, d: Any) -> list[Value]:
         """Return the Legendre coefficients of the values of row d.
@@ -178,13 +178,13 @@ class Control:
         )
         pairs = [(values[i], values[k - 1 - i]) for i in range(k // 2)]
         parts = [x + y for x, y in pairs] + values[k // 2 : k - k // 2], [x - y for x, y in pairs]
-        found = []
+        sums = []
         for j in range(k):
             total = w.zero
             for i, part in enumerate(parts[j % 2]):
                 total = w.number(table, k * j + i).fma(part, total)
-            found.append(total)
-        return found
+            sums.append(total)
+        return sums
 
     def gap(self, d: Any, last: Value, start: Value, end: Value) -> Value:
         """Return how far row d's polynomials are apart where two steps meet, if farther than it may be."""
@@ -262,11 +262,11 @@ class Control:
             is_distinct(length, t).value,
             since.compare("<", self.row("unwatched")),
         )
-        w.put(w.one.where(good, 0.0), w.array(slots["ordinary"]))
+        w.put(w.unity.where(good, 0.0), w.array(slots["ordinary"]))
         news = {
             "t0": t, "time_low": low, "error_behind": self.error, "defect_behind": self.defect,
             "length_behind": w.h, "length_limit": self.limit, "h": length, "ratio": self.factor,
-            "begin": w.one, "before": Value(b, b.load(w.sweeps)), "since": since,
+            "begin": w.unity, "before": Value(b, b.load(w.sweeps)), "since": since,
         }  # fmt: skip
         for name, value in news.items():
             w.put(value.where(good, self.row(name)), w.array(slots[name]))

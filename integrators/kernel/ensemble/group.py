@@ -48,7 +48,7 @@ class Group(Memory):
     ahead = Array("k", "rows", "lanes")
     base = Array("k", "rows", "lanes")  # what a stage has besides the state and the values
     stage = Array("rows", "lanes")
-    found = Array("rows", "lanes")  # the field there
+    field_values = Array("rows", "lanes")  # the field there
     factor = Array("rows", "lanes")
     moved = Array("rows", "lanes")  # how much the values of a row have changed
     strict = Array("rows", "lanes")  # what that is beside the row's block,
@@ -97,15 +97,15 @@ class Group(Memory):
     all_velocity = Array()  # (n, rows)
     count = Integer()  # samples of a trajectory
     times = Array()
-    targets = Array(of=int)  # steps before each sample,
+    targets = Array(kind=int)  # steps before each sample,
     parts = Array()  # and the part of a step that is left
-    part_places = Array(of=int)  # where among all lengths of parts that is; for each length
+    part_places = Array(kind=int)  # where among all lengths of parts that is; for each length
     part_matrix = Array()  # (k, k): `matrix`,
     part_extrapolation = Array()  # (k, k): `extrapolation`,
     part_reach = Array()  # and `reach`
     out = Array()  # (n, samples, dim)
-    arrived = Array(of=int)  # (n): 1, or 0 for one that left
-    all_sweeps = Array(of=int)  # (n)
+    arrived = Array(kind=int)  # (n): 1, or 0 for one that left
+    all_sweeps = Array(kind=int)  # (n)
     trajectories = Integer()  # n
     at = Integer()  # first trajectory of the group,
     end = Integer()  # and the one after the last to be done
@@ -113,11 +113,11 @@ class Group(Memory):
     sample = Integer()  # the next one to be made; -1: the group is not loaded
 
     # --- or one in each lane after another; see `ensemble.own` ---
-    contexts = Array(of=int)  # (lanes): address of a `Context` for each lane
+    contexts = Array(kind=int)  # (lanes): address of a `Context` for each lane
     start_time = Real()
     first_length = Real()  # of the first step; 0: what the field there suggests
-    member = Array("lanes", of=int)  # which trajectory is on a lane; -1: none
-    made = Array("lanes", of=int)  # its samples
+    member = Array("lanes", kind=int)  # which trajectory is on a lane; -1: none
+    samples_written = Array("lanes", kind=int)  # its samples
     before = Array("lanes")  # its sweeps before the present step
     mark = Array("lanes")  # the time at which it was last seen to get anywhere
-    all_steps = Array(of=int)  # (n)
+    all_steps = Array(kind=int)  # (n)

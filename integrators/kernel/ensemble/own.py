@@ -88,7 +88,7 @@ def load(group, lane):
     clear(group, lane)
     group.sweeps[lane], group.rate[lane] = 0.0, FIRST_RATE
     group.mark[lane] = group.start_time
-    group.made[lane] = 0
+    group.samples_written[lane] = 0
     write(group, lane, ctx)
 
 
@@ -105,17 +105,17 @@ def unload(group, lane, arrived):
 @compiled
 def write(group, lane, ctx):
     """Write the samples that are at the present time; after the last one the trajectory is at its end."""
-    i, dim, made = group.member[lane], group.dim, group.made[lane]
-    while made < group.count:
-        ctx.controller.stop = group.times[made]
+    i, dim, count = group.member[lane], group.dim, group.samples_written[lane]
+    while count < group.count:
+        ctx.controller.stop = group.times[count]
         if remaining(ctx, ctx.controller.stop) != 0.0:
             break
-        out = group.out + dim * (group.count * i + made)
+        out = group.out + dim * (group.count * i + count)
         for d in range(dim):
             out[d] = group.state[group.lanes * d + lane]
-        made += 1
-    group.made[lane] = made
-    if made == group.count:
+        count += 1
+    group.samples_written[lane] = count
+    if count == group.count:
         unload(group, lane, 1 if arrived(ctx) else 0)
 
 
@@ -235,10 +235,10 @@ def step(group, lane, ctx):
 @compiled
 def vanishes(ctx):
     """Whether a state is so near 0 that its steps are solved to less and less of its size in lanes."""
-    found = False
+    result = False
     for g in range(ctx.blocks.groups):
-        found = found or 0.0 < ctx.estimate.fastest[g] < SMALLEST
-    return found
+        result = result or 0.0 < ctx.estimate.fastest[g] < SMALLEST
+    return result
 
 
 @compiled

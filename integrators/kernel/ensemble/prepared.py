@@ -77,9 +77,9 @@ class Lanes:
         a = self._constants.arrays
         names = ("nodes", "nodes_low", "weights", "weights_low", "position_weights", "position_weights_low")
         extrapolation = a["beyond"][:, : tables.MODES] @ a["into_modes"][: tables.MODES]
-        found = {name: a[name] for name in names} | {"extrapolation": extrapolation}
-        found["into_modes"] = a["into_modes"]
-        return {name: _aligned(values) for name, values in found.items()}
+        chosen = {name: a[name] for name in names} | {"extrapolation": extrapolation}
+        chosen["into_modes"] = a["into_modes"]
+        return {name: _aligned(values) for name, values in chosen.items()}
 
     def _matrix(self, h: float) -> Numbers:
         """Return the matrix for the step h, shape (k, k)."""
@@ -114,8 +114,8 @@ class Lanes:
         if not self.second:
             return np.ones((len(par), self.rows))
         there = np.zeros((self.system.dim, len(par)))
-        found = emit.numpy(self.system, "velocity_scale")(0.0, there, np.ascontiguousarray(par.T))
-        return np.ascontiguousarray(found.T)
+        scales = emit.numpy(self.system, "velocity_scale")(0.0, there, np.ascontiguousarray(par.T))
+        return np.ascontiguousarray(scales.T)
 
     def groups(
         self, t0: float, h: float, numbers: dict[str, int], arrays: dict[str, NDArray[np.generic]]
@@ -167,16 +167,16 @@ def lanes_of(
 ) -> tuple[Lanes | None, float]:
     """Return a method on trajectories in lanes, or ``None`` where it cannot be; and the seconds that took."""
     started = binary.clock()
-    found = None
+    lanes_ = None
     if Lanes.takes(system, constants, second):
         try:
-            found = Lanes(system, constants, second, unit, varying)
+            lanes_ = Lanes(system, constants, second, unit, varying)
         except Exception as error:
             from numba.core.errors import NumbaError  # has been imported to compile
 
             if not isinstance(error, NumbaError):
                 raise
-    return found, binary.clock() - started
+    return lanes_, binary.clock() - started
 
 
 def _reach(matrix: Numbers) -> Numbers:
@@ -188,6 +188,6 @@ def _reach(matrix: Numbers) -> Numbers:
 
 
 def _aligned(values: Numbers) -> Numbers:
-    made = aligned(values.size)
-    made[:] = values.reshape(-1)
-    return made
+    copy = aligned(values.size)
+    copy[:] = values.reshape(-1)
+    return copy

@@ -76,13 +76,13 @@ def compile_steps(system: System, form: Form) -> binary.Native:
     numba.core.errors.NumbaError
         If the field cannot be compiled on lanes.
     """
-    what = "force" if form.second else "field"
-    source = emit.source(system, what, "numba")
+    quantity = "force" if form.second else "field"
+    source = emit.source(system, quantity, "numba")
     modules = binary.sources(*field.SOURCES, "ensemble", "step")
     name = store.key("ensemble", source.text, repr(form), modules)
 
     def make() -> tuple[str, bytes]:
-        function, arguments = field.on_lanes(emit.numba(system, what).py_func, form.lanes, par=True)
+        function, arguments = field.on_lanes(emit.numba(system, quantity).py_func, form.lanes, par=True)
         return field.ON_LANES, binary.build(
             function, arguments, around=lambda inner: Steps(inner, form).text()
         )
@@ -110,7 +110,7 @@ class Steps(Writer):
     floored: Any
     size: Any
     stage: Any
-    found: Any
+    field_values: Any
 
     def __init__(self, inner: str, form: Form):
         super().__init__(inner, form.lanes, unrolled=form.k * form.k * form.rows <= UNROLLED)
@@ -122,7 +122,7 @@ class Steps(Writer):
         k, rows = form.k, form.rows
         count = self.function.args[1]
         self.zero = Value(b, ir.Constant(self.kind, [0.0] * form.lanes))
-        self.one = self.zero.of(1.0)
+        self.unity = self.zero.constant(1.0)
         slots = Group.slots
         for name in (
             "nodes",
@@ -135,7 +135,7 @@ class Steps(Writer):
             setattr(self, name, self.array(slots[name]))
         for name in ("state", "error", "velocity", "par"):
             setattr(self, name, self.array(slots[name]))
-        for name in ("factor", "moved", "strict", "floored", "size", "stage", "found"):
+        for name in ("factor", "moved", "strict", "floored", "size", "stage", "field_values"):
             setattr(self, name, self.room(slots[name], rows))
         self.held = self.unrolled and machine.many_registers()
         self.values = self.room(slots["values"], k * rows) if self.held else self.array(slots["values"])
@@ -165,7 +165,7 @@ class Steps(Writer):
         b.position_at_end(end)
         if self.held:
             self.each(k * rows, lambda i: self.put(self.get(self.values, i), kept, i))
-        self.put(self.one.where(b.load(self.alive), 0.0), self.array(slots["alive"]))
+        self.put(self.unity.where(b.load(self.alive), 0.0), self.array(slots["alive"]))
         for variable, name in ((self.sweeps, "sweeps"), (self.rate, "rate")):
             self.put(Value(b, b.load(variable)), self.array(slots[name]))
         b.store(b.zext(self.any(b.load(self.alive)), INTEGER), self.word(slots["living"]))
@@ -284,11 +284,11 @@ class Steps(Writer):
             for j in order:
                 places = [self.at(j, rows, d) for d in some]
                 factor = factors[j]
-                found = [known[p] if known and p in known else self.get(values, p) for p in places]
+                operands = [known[p] if known and p in known else self.get(values, p) for p in places]
                 if starts is None:
-                    starts = [factor * value for value in found]
+                    starts = [factor * value for value in operands]
                 else:
-                    starts = [factor.fma(value, start) for value, start in zip(found, starts, strict=True)]
+                    starts = [factor.fma(value, start) for value, start in zip(operands, starts, strict=True)]
             assert starts is not None
             return starts
 
@@ -310,7 +310,7 @@ class Steps(Writer):
             return
         table = self.table(Group.slots["extrapolation"])
 
-        def one(i: Index) -> None:
+        def stage(i: Index) -> None:
             totals = self.combination(table, i, self.values)
 
             def ahead(some: list[Index]) -> None:
@@ -319,7 +319,7 @@ class Steps(Writer):
 
             self.few_rows(ahead)
 
-        self.each(k, one)
+        self.each(k, stage)
         self.each(k * rows, lambda i: self.put(self.get(self.ahead, i), self.values, i))
 
     def predict_elsewhere(self) -> None:
@@ -344,7 +344,7 @@ class Steps(Writer):
     def iterate(self) -> None:
         """Sweep until every lane is solved, or has left."""
         b, form = self.b, self.form
-        infinite = self.zero.of(INFINITY).value
+        infinite = self.zero.constant(INFINITY).value
         none = ir.Constant(self.bits, [0] * form.lanes)
         self.last, self.best = self.variable(self.kind, infinite), self.variable(self.kind, infinite)
         self.stalled = self.variable(self.kind, self.zero.value)
@@ -386,11 +386,13 @@ class Steps(Writer):
 
             self.few_rows(displace)
             time = self.t + self.number(self.nodes, i).fma(self.h, self.t_low)
-            b.call(self.field, [self.result, self.exception, time.value, self.stage, self.par, self.found])
+            b.call(
+                self.field, [self.result, self.exception, time.value, self.stage, self.par, self.field_values]
+            )
 
             def keep(d: Index) -> None:
                 place = self.at(i, rows, d)
-                old, new = self.get(values, place), self.get(self.found, d)
+                old, new = self.get(values, place), self.get(self.field_values, d)
                 self.put(self.get(self.moved, d).larger((new - old).absolute()), self.moved, d)
                 kept = new.where(active, old)
                 self.put(kept, values, place)
@@ -475,7 +477,7 @@ class Steps(Writer):
         leaves = b.and_(failing, b.load(self.again))
         anew = b.and_(failing, b.not_(b.load(self.again)))
         b.store(b.or_(b.load(self.again), anew), self.again)
-        infinite = self.zero.of(INFINITY)
+        infinite = self.zero.constant(INFINITY)
         for variable in (self.last, self.best, self.left):
             b.store(infinite.where(anew, Value(b, b.load(variable))).value, variable)
         b.store(self.zero.where(anew, Value(b, b.load(self.stalled))).value, self.stalled)

@@ -56,16 +56,16 @@ class Writer:
         """Return where ``count`` rows are during steps: in registers if possible, or in the slot's memory."""
         if not self.unrolled:
             return self.array(slot)
-        made = self.b.alloca(ir.ArrayType(self.kind, count))
-        made.align = ALIGNMENT
-        return self.b.bitcast(made, DOUBLE.as_pointer())
+        memory = self.b.alloca(ir.ArrayType(self.kind, count))
+        memory.align = ALIGNMENT
+        return self.b.bitcast(memory, DOUBLE.as_pointer())
 
     def variable(self, kind: Any, value: Any) -> Any:
         """Return where a variable is."""
         with self.b.goto_entry_block():
-            made = self.b.alloca(kind)
-        self.b.store(value, made)
-        return made
+            memory = self.b.alloca(kind)
+        self.b.store(value, memory)
+        return memory
 
     def place(self, base: Any, index: Index, kind: Any) -> Any:
         """Return the address of item ``index`` of an array of ``kind``."""

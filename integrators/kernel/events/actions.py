@@ -89,13 +89,13 @@ def end_step(ctx, search, before):
 def make(ctx, search, event):
     """Make the new state by the event's action; return whether it could be made."""
     spread_state(search, search.time, search.new_state)
-    search.made[8 * search.dim] = 0.0
-    call_field(search.actions[event], search.times, search.block, ctx.par, search.made)
-    if search.made[8 * search.dim] != 0.0:
+    search.action_outputs[8 * search.dim] = 0.0
+    call_field(search.actions[event], search.times, search.block, ctx.par, search.action_outputs)
+    if search.action_outputs[8 * search.dim] != 0.0:
         search.raised = -1 - event
         return False
     for d in range(search.dim):
-        search.new_state[d] = search.made[8 * d]
+        search.new_state[d] = search.action_outputs[8 * d]
     return True
 
 

@@ -105,12 +105,12 @@ def suspect(search):
     for i in range(0, whole, 8):  # side by side
         values = get(p, i)
         lows, highs, leasts = min(lows, values), max(highs, values), min(leasts, abs(values))
-    put(search.found, 0, lows)
+    put(search.outputs, 0, lows)
     put(search.block, 0, highs)
     put(search.times, 0, leasts)
     low, high, least = INFINITY, -INFINITY, INFINITY
     for i in range(8):
-        low, high = min(low, search.found[i]), max(high, search.block[i])
+        low, high = min(low, search.outputs[i]), max(high, search.block[i])
         least = min(least, search.times[i])
     for i in range(whole, search.n):
         low, high, least = min(low, p[i]), max(high, p[i]), min(least, abs(p[i]))

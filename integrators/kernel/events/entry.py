@@ -198,7 +198,7 @@ def examine(ctx, search):
     finite, unresolved = transform(search, degree)
     if finite and not unresolved and keeps_away(search, degree):
         return GOING
-    know(search, degree, finite)
+    note_samples(search, degree, finite)
     if not (unresolved or suspect(search)):
         return GOING
     if vanishes(ctx, search):  # the sign at its end is rounding's: that before it lasts
@@ -208,14 +208,14 @@ def examine(ctx, search):
         degree = min(4 * degree, FINEST)
         sample(ctx, search, degree)
         finite, unresolved = transform(search, degree)
-        know(search, degree, finite)
+        note_samples(search, degree, finite)
     if unresolved and search.resolution < SHORTEST:
         return divide(ctx, search)
     return settle(ctx, search, degree, unresolved)
 
 
 @compiled
-def know(search, degree, finite):
+def note_samples(search, degree, finite):
     """Set what is known of a function from its samples and their coefficients."""
     if finite:
         refine(search, degree)
@@ -233,7 +233,7 @@ def divide(ctx, search):
         search.end_value = function(ctx, search, search.end, search.end_state)
         sample(ctx, search, FINEST)
         finite, unresolved = transform(search, FINEST)
-        know(search, FINEST, finite)
+        note_samples(search, FINEST, finite)
         suspect(search)
         if vanishes(ctx, search):
             start_value = TINY * sign(start_value)

@@ -90,20 +90,20 @@ class EventFunction:
     def _call(self, t: int, states: int, par: int, values: int) -> None:
         """Evaluate state by state; equal ones that follow each other only once."""
         try:
-            found = _numbers(values, LANES + 1)
-            found[:LANES] = np.nan
+            outputs = _numbers(values, LANES + 1)
+            outputs[:LANES] = np.nan
             if raised.kept() is not None:
-                found[LANES] = 1.0
+                outputs[LANES] = 1.0
                 return
             times, dim = _numbers(t, LANES).tolist(), self._system.dim
             columns = _numbers(states, LANES * dim).reshape(dim, LANES).T.copy()
             given = self._parameters(_numbers(par, self._system.n_par).copy())
             for i in range(LANES):
                 if i and times[i] == times[i - 1] and np.array_equal(columns[i], columns[i - 1]):
-                    found[i] = found[i - 1]
+                    outputs[i] = outputs[i - 1]
                     continue
                 with suppress(*UNDEFINED), np.errstate(all="ignore"):
-                    found[i] = self._evaluate(times[i], columns[i].copy(), given)
+                    outputs[i] = self._evaluate(times[i], columns[i].copy(), given)
         except BaseException as error:  # also Ctrl-C: nothing passes through compiled code
             self._raised.error = error
             _numbers(values, LANES + 1)[LANES] = 1.0
@@ -134,14 +134,14 @@ class Action:
 
     def __init__(self, name: str, then: Callable[..., Any], problem: Problem):
         self._system, self._raised = problem.system, _Raised()
-        what = f"then of event {name!r}"
+        label = f"then of event {name!r}"
         try:
-            traced = problem.system.trace(then, what, problem.system.dim)
+            traced = problem.system.trace(then, label, problem.system.dim)
         except InputError as refused:
-            self._then, self._wanted, self._what = then, _wanted(then, refused), what
+            self._then, self._wanted, self._what = then, _wanted(then, refused), label
             with np.errstate(all="ignore"):
                 try:
-                    self._made(problem.t0, problem.y0.copy(), problem.par.copy())
+                    self._new_state(problem.t0, problem.y0.copy(), problem.par.copy())
                 except InputError:
                     raise
                 except Exception:
@@ -160,7 +160,7 @@ class Action:
         """What the function raised last in this thread, if Python runs it."""
         return self._raised.error
 
-    def _made(self, t: float, y: Any, par: Any) -> Any:
+    def _new_state(self, t: float, y: Any, par: Any) -> Any:
         parameters = SimpleNamespace(**self._system.unpack(par))
         value = _called(self._then, self._wanted, self._system.dof, t, y, parameters)
         state = np.asarray(value, dtype=np.float64)
@@ -176,7 +176,7 @@ class Action:
                 return
             state = _numbers(states, LANES * dim)[::LANES].copy()
             given = _numbers(par, self._system.n_par).copy()
-            _numbers(values, LANES * dim)[::LANES] = self._made(float(_numbers(t, 1)[0]), state, given)
+            _numbers(values, LANES * dim)[::LANES] = self._new_state(float(_numbers(t, 1)[0]), state, given)
         except BaseException as error:  # also Ctrl-C: nothing passes through compiled code
             self._raised.error = error
             _numbers(values, LANES * dim + 1)[LANES * dim] = 1.0

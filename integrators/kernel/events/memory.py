@@ -23,12 +23,12 @@ class Search(Memory):
 
     # --- what is looked for ---
     count = Integer()  # events
-    functions = Array("count", of=int)  # addresses of void(times, states, par, values), on eight states
-    directions = Array("count", of=int)  # 1, -1, or 0 for all
-    actions = Array("count", of=int)  # addresses of functions like those, that make a new state; 0: none
+    functions = Array("count", kind=int)  # addresses of void(times, states, par, values), on eight states
+    directions = Array("count", kind=int)  # 1, -1, or 0 for all
+    actions = Array("count", kind=int)  # addresses of functions like those, that make a new state; 0: none
     last = Real()  # the time up to which is looked, where some do
     sign = Real()  # of the direction of time
-    limits = Array("count", of=int)  # the occurrence that ends the integration; 0: none
+    limits = Array("count", kind=int)  # the occurrence that ends the integration; 0: none
     dim = Integer()
     terms = Integer()  # of the step's polynomial
     chunks = Integer()  # of eight first samples
@@ -40,14 +40,14 @@ class Search(Memory):
     part = Real()  # length of the partial step ...
     part_known = Real()  # ... and of the last one from the same state, if there was one
     cosines = Array()  # of the angles pi i / (FINE FINEST)
-    transforms = Array(of=int)  # addresses of tables, samples -> coefficients, by an eighth of the degree
+    transforms = Array(kind=int)  # addresses of tables, samples -> coefficients, by an eighth of the degree
     first_weights = Array(16, "terms", "chunks")  # `weights` at the first samples of a whole step
 
     # --- what lasts from step to step ---
     ends = Array("count")  # values of the functions at the present state
     touched = Array("count")  # when each was last seen to touch zero
-    finite = Array("count", of=int)  # 1: the function was finite somewhere
-    happened = Array("count", of=int)
+    finite = Array("count", kind=int)  # 1: the function was finite somewhere
+    happened = Array("count", kind=int)
     known = Real()  # the time up to which all is known
     evaluations = Integer()  # of the field, for partial steps
     iterations = Integer()
@@ -59,15 +59,15 @@ class Search(Memory):
     hit_times = Array()
     hit_states = Array()
     hit_after = Array()  # states that the events' actions have made of these
-    hit_events = Array(of=int)
-    hit_directions = Array(of=int)
+    hit_events = Array(kind=int)
+    hit_directions = Array(kind=int)
 
     # --- events that change the state, or end it all, at the end of the step; see `events.actions` ---
-    due = Array("count", of=int)  # 1: it happens there
-    due_directions = Array("count", of=int)
+    due = Array("count", kind=int)  # 1: it happens there
+    due_directions = Array("count", kind=int)
     values_before = Array("count")  # of the functions, before the state is changed
     new_state = Array("dim")
-    made = Array(
+    action_outputs = Array(
         "made_rows", 8
     )  # a new state, in columns; the first of the last row: 1 where making it has raised
     made_rows = Integer()
@@ -96,7 +96,7 @@ class Search(Memory):
     sampled = Array("count", FINEST)  # values of each function at the first samples, but for the first
     times = Array(8)
     block = Array("dim", 8)  # states, one in a column
-    found = Array(16)  # values of a function on a block; [8]: 1 where it has raised
+    outputs = Array(16)  # values of a function on a block; [8]: 1 where it has raised
     weights = Array(16, "terms")  # of the coefficients of the step's polynomial, at eight times
     values = Array(FINEST + 8)  # samples
     coefficients = Array(FINEST + 32)  # of Chebyshev polynomials
@@ -105,13 +105,13 @@ class Search(Memory):
     places = Array(PLACES)
     fine = Array(PLACES)  # values of the polynomial there, or samples
     scale = Real()  # the largest of them
-    lows = Array(PLACES, of=int)
+    lows = Array(PLACES, kind=int)
     low_count = Integer()
     marks = Array(ROOM)  # places where the sign of the function is known
-    mark_signs = Array(ROOM, of=int)
+    mark_signs = Array(ROOM, kind=int)
     mark_count = Integer()
     zeros = Array(ROOM)
-    zero_directions = Array(ROOM, of=int)
+    zero_directions = Array(ROOM, kind=int)
     zero_count = Integer()
 
     # --- states at ends of partial steps ---

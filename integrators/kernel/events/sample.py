@@ -128,15 +128,15 @@ def weigh_first(ctx, search):
 
 @compiled
 def call(ctx, search, event):
-    """Set `Search.found` to the values of a function on the block."""
-    found = search.found
+    """Set `Search.outputs` to the values of a function on the block."""
+    outputs = search.outputs
     if search.raised:
-        put(found, 0, splat8(NAN))
+        put(outputs, 0, splat8(NAN))
         return
-    call_field(search.functions[event], search.times, search.block, ctx.par, found)
-    if found[8] != 0.0:
+    call_field(search.functions[event], search.times, search.block, ctx.par, outputs)
+    if outputs[8] != 0.0:
         search.raised = 1 + event
-        found[8] = 0.0
+        outputs[8] = 0.0
 
 
 @compiled
@@ -146,7 +146,7 @@ def sample(ctx, search, degree):
         fill(ctx, search, chunk, degree, 0)
         call(ctx, search, search.event)
         for i in range(8):
-            search.values[1 + 8 * chunk + i] = search.found[i]
+            search.values[1 + 8 * chunk + i] = search.outputs[i]
     search.values[0] = search.start_value
     search.values[degree] = search.end_value
 
@@ -160,7 +160,7 @@ def sample_first(ctx, search):
         for event in range(search.count):
             call(ctx, search, event)
             for i in range(8):
-                search.sampled[FINEST * event + 8 * chunk + i] = search.found[i]
+                search.sampled[FINEST * event + 8 * chunk + i] = search.outputs[i]
 
 
 @compiled
@@ -176,7 +176,7 @@ def function(ctx, search, t, state):
     """Return the value of the function that is looked for."""
     spread_state(search, t, state)
     call(ctx, search, search.event)
-    return search.found[0]
+    return search.outputs[0]
 
 
 @compiled
@@ -190,7 +190,7 @@ def noise_of(ctx, search, t, state):
             search.block[8 * (first + i) + i] += NUDGE * abs(state[first + i])
         call(ctx, search, search.event)
         for i in range(count):
-            slope = abs(search.found[i] - value) / NUDGE
+            slope = abs(search.outputs[i] - value) / NUDGE
             total += slope if is_finite(slope) else 0.0
             search.block[8 * (first + i) + i] = state[first + i]
     return ROUNDING * total

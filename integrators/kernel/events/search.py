@@ -49,8 +49,8 @@ def _tables() -> tuple[Array, list[Array], NDArray[np.int64]]:
         width = 32 * (degree // 32 + 1)
         table = aligned((degree + 1) * width)
         angles = np.outer(np.arange(degree + 1), np.arange(degree + 1)) * (np.pi / degree)
-        made = 2.0 / degree * half[:, None] * np.cos(angles) * half[None, :]
-        table.reshape(degree + 1, width)[:, : degree + 1] = made
+        table_ = 2.0 / degree * half[:, None] * np.cos(angles) * half[None, :]
+        table.reshape(degree + 1, width)[:, : degree + 1] = table_
         tables[degree // LEAST] = table
         degree *= 2
     return cosines, tables, np.array([table.ctypes.data for table in tables])

@@ -75,13 +75,13 @@ def zero_between(ctx, search, a, b):
 @compiled
 def largest_beside(ctx, search, x, distance):
     """Return the largest size of a value at a distance from a place; -1 where there is none."""
-    found = -1.0
+    most = -1.0
     for place in (x - distance, x + distance):
         if place >= 0.0 and place <= 1.0:
             value = abs(value_at(ctx, search, place))
             if is_finite(value):
-                found = max(found, value)
-    return found
+                most = max(most, value)
+    return most
 
 
 @compiled

@@ -18,14 +18,14 @@ context = view(Context)
 
 
 @intrinsic
-def call_part(typing, steps, what, own, partial, part, out):
+def call_part(typing, steps, operation, own, partial, part, out):
     """Call the compiled steps for a partial step; see `integrators.kernel.step.entry`."""
 
     def generate(context, builder, sig, args):
-        function, what, own, partial, part, out = args
+        function, operation, own, partial, part, out = args
         none = ir.Constant(INTEGER, 0)
         out = builder.ptrtoint(out, INTEGER)
-        words = [what, own, partial, none, none, none, none, part, none, out, none]
+        words = [operation, own, partial, none, none, none, none, part, none, out, none]
         kind = ir.FunctionType(INTEGER, [INTEGER] * len(words))
         return builder.call(builder.inttoptr(function, kind.as_pointer()), words)
 

@@ -90,13 +90,13 @@ def find_lows(search, first, last):
 @compiled
 def change_beside(ctx, search, x, distance):
     """Return by how much values differ at a distance from a place."""
-    here, found = value_at(ctx, search, x), 0.0
+    here, change = value_at(ctx, search, x), 0.0
     for place in (x - distance, x + distance):
         if place >= 0.0 and place <= 1.0:
             value = value_at(ctx, search, place)
             if is_finite(value):
-                found = max(found, abs(value - here))
-    return found
+                change = max(change, abs(value - here))
+    return change
 
 
 @compiled

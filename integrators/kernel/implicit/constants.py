@@ -71,10 +71,10 @@ def method(k: int, s: int, second: bool, lanes: int, kind: int) -> Method:
     else:
         # Real up to rounding: the one eigenvalue of odd degree that has no conjugate.
         alone = np.abs(values.imag) < 1e-12 * np.abs(values)
-        one = alone | (values.imag > 0.0)
-        eigenvalues = np.where(alone, values.real + 0j, values)[one]
-        left = np.linalg.inv(vectors)[one].astype(np.complex128)
-        right = vectors[:, one] * np.where(alone, 1.0, 2.0)[one]
+        upper = alone | (values.imag > 0.0)
+        eigenvalues = np.where(alone, values.real + 0j, values)[upper]
+        left = np.linalg.inv(vectors)[upper].astype(np.complex128)
+        right = vectors[:, upper] * np.where(alone, 1.0, 2.0)[upper]
     inverse = np.linalg.inv(x).astype(np.float64)
     radius = float(np.abs(values).max()) ** (2 if second else 1)
     return Method(

@@ -141,11 +141,11 @@ def full(ctx, m, above):
     if second:
         for i in range(s):
             for d in range(rows):
-                found = 0.0
+                total = 0.0
                 for j in range(s):
-                    found += m.x[i, j] * x[j * rows + d]
+                    total += m.x[i, j] * x[j * rows + d]
                 place = at(m, i, above + d)
-                m.correction[place] = m.residual[place] + ctx.factors.row[above + d] * found
+                m.correction[place] = m.residual[place] + ctx.factors.row[above + d] * total
     return True
 
 
@@ -163,10 +163,10 @@ def set_residual(ctx, m):
 @compiled
 def is_finite(values, count):
     """Whether all of ``count`` values are finite numbers."""
-    found = 0.0
+    total = 0.0
     for i in range(count):
-        found += values[i] * 0.0
-    return found == 0.0
+        total += values[i] * 0.0
+    return total == 0.0
 
 
 @compiled

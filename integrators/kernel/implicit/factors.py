@@ -61,9 +61,9 @@ class Factors:
         self._callback = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)(self._called)
         self.address: int = ctypes.cast(self._callback, ctypes.c_void_p).value or 0
 
-    def _called(self, what: int, group: int) -> int:
+    def _called(self, operation: int, group: int) -> int:
         try:
-            if what == FACTORIZE:
+            if operation == FACTORIZE:
                 self._factorize()
             else:
                 self._solve(group)
@@ -103,17 +103,17 @@ class Factors:
 
     def _solve_copy(self, group: int, x: Any, y: Any) -> None:
         if len(self._solvers) == 1 and self._values[0].imag == 0.0:  # all belong to the one matrix
-            found = self._solvers[0](np.concatenate([x, y], axis=1))
-            x[:], y[:] = found[:, :8], found[:, 8:]
+            solution = self._solvers[0](np.concatenate([x, y], axis=1))
+            x[:], y[:] = solution[:, :8], solution[:, 8:]
             return
         for lane, pair in enumerate(range(8 * group, min(8 * group + 8, len(self._solvers)))):
             solve, real = self._solvers[pair], self._values[pair].imag == 0.0
             if real:
-                found = solve(np.stack([x[:, lane], y[:, lane]], axis=1))
-                x[:, lane], y[:, lane] = found[:, 0], found[:, 1]
+                solution = solve(np.stack([x[:, lane], y[:, lane]], axis=1))
+                x[:, lane], y[:, lane] = solution[:, 0], solution[:, 1]
             else:
-                found = solve(x[:, lane] + 1j * y[:, lane])
-                x[:, lane], y[:, lane] = found.real, found.imag
+                solution = solve(x[:, lane] + 1j * y[:, lane])
+                x[:, lane], y[:, lane] = solution.real, solution.imag
 
 
 class _Pattern:

@@ -17,9 +17,9 @@ INFINITY = float("inf")
 def exchange(matrix, width, i, j):
     """Exchange two rows of ``width`` doubles."""
     for c in range(0, width, 8):
-        one, other = get(matrix, width * i + c), get(matrix, width * j + c)
+        first, other = get(matrix, width * i + c), get(matrix, width * j + c)
         put(matrix, width * i + c, other)
-        put(matrix, width * j + c, one)
+        put(matrix, width * j + c, first)
 
 
 @compiled
@@ -135,8 +135,8 @@ def eliminate(matrix, n, width, x):
             for j in range(8 * (c // 8), width, 8):  # what is to the left of column c is not needed any more
                 put(matrix, row + j, fma(splat8(-a), get(matrix, top + j), get(matrix, row + j)))
     for r in range(n - 1, -1, -1):
-        found = x[r]
+        value = x[r]
         for c in range(r + 1, n):
-            found -= matrix[width * r + c] * x[c]
-        x[r] = found * matrix[width * r + r]
+            value -= matrix[width * r + c] * x[c]
+        x[r] = value * matrix[width * r + r]
     return True

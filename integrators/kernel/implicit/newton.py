@@ -95,9 +95,9 @@ def nearer(ctx, m):
     for d in range(ctx.rows):
         for group in range(m.groups):
             i = 8 * (m.padded * group + d)
-            found = get(m.gamma, i)
-            far = max(far, abs(found - get(m.predicted, i)) * spread(scale, d))
-            still = max(still, abs(found) * spread(scale, d))
+            gamma = get(m.gamma, i)
+            far = max(far, abs(gamma - get(m.predicted, i)) * spread(scale, d))
+            still = max(still, abs(gamma) * spread(scale, d))
     return largest(far) < largest(still)
 
 

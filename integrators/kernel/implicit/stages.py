@@ -133,13 +133,13 @@ def measure(ctx, m):
 @compiled
 def changes(ctx, m, kind):
     """Return the largest change by the last correction, relative to blocks, small ones raised or not."""
-    found = change(ctx, ctx.blocks.weights if kind == STRICT else ctx.blocks.floored_weights)
+    result = change(ctx, ctx.blocks.weights if kind == STRICT else ctx.blocks.floored_weights)
     if ctx.second:
-        top = splat8(found)
+        top = splat8(result)
         for d in range(ctx.rows):
             scale = abs(m.factor[d]) * (m.slope_strict[d] if kind == STRICT else m.slope_floored[d])
             for group in range(m.groups):
                 i = m.block + 8 * (m.padded * group + d)
                 top = larger(top, abs(get(m.correction, i)) * scale)
-        found = largest(top)
-    return found
+        result = largest(top)
+    return result

@@ -56,19 +56,19 @@ class Linearization:
 
 def linearization(system: System, *, second: bool) -> Linearization:
     """Compile the Jacobian of a system's field, or of its force, or load it."""
-    found = system.jacobian("force" if second else "field")
-    if found is None:
+    jacobian = system.jacobian("force" if second else "field")
+    if jacobian is None:
         return Linearization(None, None)
     try:
-        emit.compilable(system, found)
+        emit.compilable(system, jacobian)
     except InputError:  # differences take the field alone
         return Linearization(None, None)
-    text = emit.source(system, found, "numba").text
+    text = emit.source(system, jacobian, "numba").text
     name = store.key("jacobian", text, binary.sources(*fields.SOURCES))
-    made = binary.obtain(
-        name, lambda: (fields.ONE_BY_ONE, fields.build_one_by_one(emit.numba(system, found).py_func, 1))
+    native = binary.obtain(
+        name, lambda: (fields.ONE_BY_ONE, fields.build_one_by_one(emit.numba(system, jacobian).py_func, 1))
     )
-    return Linearization(found, made)
+    return Linearization(jacobian, native)
 
 
 @dataclass(frozen=True)
@@ -177,14 +177,14 @@ class Workspace(Memory):
     contraction_h = Real()  # ... of a step of this length
 
     # --- the Jacobian and the factors ---
-    entry_rows = Table("entry_count", of=int)
-    entry_columns = Table("entry_count", of=int)
+    entry_rows = Table("entry_count", kind=int)
+    entry_columns = Table("entry_count", kind=int)
     entries = Table("entry_count")
     state = Table("unknowns")  # where the Jacobian is taken
     lu = Array("lu_size")  # factors of eight matrices at a time; see `integrators.kernel.implicit.linear`
-    pivots = Array("lu_rows", of=int)
-    begins = Array("lu_rows", of=int)
-    ends = Array("lu_rows", of=int)
+    pivots = Array("lu_rows", kind=int)
+    begins = Array("lu_rows", kind=int)
+    ends = Array("lu_rows", kind=int)
     whole_matrix = Array("whole_size")
     whole_x = Array("whole")
     linearized = Integer()  # 1: the entries are those at `state`
@@ -276,9 +276,9 @@ class Workspace(Memory):
         pulls : int
             Address of relative derivatives of velocities, or 0.
         """
-        made = Workspace(shape, self.kind, self.linearization, shape.rows // self.rows, padded)
-        made.first, made.trajectory, made.pulls = shape.rows, self.address, pulls
-        return made
+        workspace = Workspace(shape, self.kind, self.linearization, shape.rows // self.rows, padded)
+        workspace.first, workspace.trajectory, workspace.pulls = shape.rows, self.address, pulls
+        return workspace
 
     def copy(self) -> Self:
         """Return memory of its own, with factors of its own."""

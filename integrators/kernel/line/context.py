@@ -18,16 +18,16 @@ class LineContext(Context):
     invariants = Integer()  # how many
     every = Integer()  # rows of `found`
     measure = Integer()  # address of what writes the gradients and then the invariants themselves
-    found = Array("calls", "every", "lanes")  # in the layout of stage memory
+    gradients = Array("calls", "every", "lanes")  # in the layout of stage memory
     rest = Array("calls", "every", "lanes")  # what their first s coefficients leave of the rows
     legendre = Array("coefficient_groups", "every", 8)  # these coefficients
     coefficient_groups = Integer()  # of 8
     onto = Array()  # values -> coefficients
     back = Array()  # coefficients -> values at the stages
     metric = Array("rows")  # the diagonal of W
-    active = Array("invariants", of=int)  # 0 for an invariant that follows from others
-    order = Array(of=int)  # in which components are summed up
-    ends = Array(of=int)  # 1 where a partial sum of that order ends
+    active = Array("invariants", kind=int)  # 0 for an invariant that follows from others
+    order = Array(kind=int)  # in which components are summed up
+    ends = Array(kind=int)  # 1 where a partial sum of that order ends
     terms = Array("rows")  # of such a sum
     gram = Table("invariants", "invariants")
     lower = Table("invariants", "invariants")

@@ -15,7 +15,7 @@ NEARLY = 0.1  # the first of the invariants is taken whose rest is no smaller th
 
 
 def independent(
-    system: System, what: emit.Quantity, metric: Array, y: Array, par: Array, t: float
+    system: System, quantity: emit.Quantity, metric: Array, y: Array, par: Array, t: float
 ) -> NDArray[np.bool_]:
     """Tell which invariants to keep so that all are kept, one gradient orthogonalized after another.
 
@@ -29,7 +29,7 @@ def independent(
     ----------
     system : System
         Whose invariants they are.
-    what : Function
+    quantity : Function
         The field and the gradients of n scalar invariants, for the emitters.
     metric : ndarray, shape (dim,)
         Diagonal of the metric in which gradients are compared.
@@ -41,7 +41,7 @@ def independent(
     ndarray of bool, shape (n,)
         All true where anything is not finite.
     """
-    function = emit.numpy(system, what)
+    function = emit.numpy(system, quantity)
     dim = y.size
     with np.errstate(all="ignore"):
         slope = function(t, y, par)[:dim]

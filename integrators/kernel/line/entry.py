@@ -17,13 +17,13 @@ KEPT = 1e-8  # an invariant that changes faster, relative to the terms of its ch
 
 
 @compiled
-def entry(what, address):
+def entry(operation, address):
     """Do what ``what`` names for the context at an address; see `integrators.kernel.context.Context.line`."""
     ctx = context(address)
-    if what == VALUES:
+    if operation == VALUES:
         evaluate(ctx)
         return DONE
-    if what == END:
+    if operation == END:
         if ctx.mode == INVARIANTS and find_change(ctx, KEPT):
             return NOT_KEPT
         return end(ctx)
@@ -39,7 +39,11 @@ def evaluate(ctx):
     stage, row = lanes * ctx.padded, lanes * ctx.every
     for call in range(ctx.calls):
         call_field(
-            ctx.field, ctx.times + lanes * call, ctx.stages + stage * call, ctx.par, ctx.found + row * call
+            ctx.field,
+            ctx.times + lanes * call,
+            ctx.stages + stage * call,
+            ctx.par,
+            ctx.gradients + row * call,
         )
     if ctx.mode == INVARIANTS:
         keep_invariants(ctx)
@@ -56,7 +60,7 @@ def end(ctx):
     """
     lanes, h = ctx.lanes, ctx.h
     several = ctx.mode == INVARIANTS
-    values = ctx.found if several else ctx.values
+    values = ctx.gradients if several else ctx.values
     block = lanes * (ctx.every if several else ctx.padded)
     weights, weights_low, state, error = ctx.tables.weights, ctx.tables.weights_low, ctx.state, ctx.error
     damage = 0.0

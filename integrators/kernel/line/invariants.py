@@ -32,7 +32,7 @@ GAIN = 0.125  # of a gap is taken back in a step: the noise of its evaluation av
 
 @compiled
 def row(ctx, chunk):
-    """Return where in `LineContext.found` the first row of a group of eight stages is."""
+    """Return where in `LineContext.gradients` the first row of a group of eight stages is."""
     return place(chunk, ctx.every * ctx.lanes, ctx.lanes)
 
 
@@ -54,7 +54,7 @@ def keep_invariants(ctx):
     """Set ``values`` to f - W sum_i g_i alpha_i, from ``found``."""
     lanes, every, dim, n = ctx.lanes, ctx.every, ctx.rows, ctx.invariants
     width, groups, chunks = dim * (1 + n), ctx.coefficient_groups, ctx.chunks
-    multiply(ctx.onto, groups, chunks, ctx.found, lanes, ctx.legendre, 8, width, every)
+    multiply(ctx.onto, groups, chunks, ctx.gradients, lanes, ctx.legendre, 8, width, every)
     multiply(ctx.back, chunks, groups, ctx.legendre, 8, ctx.rest, lanes, width, every)
     set_gram(ctx)
     set_right(ctx)
@@ -66,12 +66,12 @@ def keep_invariants(ctx):
     for a in range(n):
         alpha[a] += right[a]
     for chunk in range(chunks):
-        found, values = ctx.found + row(ctx, chunk), ctx.values + offset(ctx, chunk)
+        sums, values = ctx.gradients + row(ctx, chunk), ctx.values + offset(ctx, chunk)
         for d in range(dim):
             moved = splat8(0.0)
             for a in range(n):
-                moved += spread(alpha, a) * get(found, lanes * (dim * (1 + a) + d))
-            put(values, lanes * d, get(found, lanes * d) - spread(ctx.metric, d) * moved)
+                moved += spread(alpha, a) * get(sums, lanes * (dim * (1 + a) + d))
+            put(values, lanes * d, get(sums, lanes * d) - spread(ctx.metric, d) * moved)
 
 
 @compiled
@@ -97,9 +97,9 @@ def set_right(ctx):
     lanes, dim, terms, weights = ctx.lanes, ctx.rows, ctx.terms, ctx.tables.weights
     width = dim * (1 + ctx.invariants)
     for chunk in range(ctx.chunks):
-        found, rest = ctx.found + row(ctx, chunk), ctx.rest + row(ctx, chunk)
+        sums, rest = ctx.gradients + row(ctx, chunk), ctx.rest + row(ctx, chunk)
         for d in range(width):
-            put(rest, lanes * d, get(found, lanes * d) - get(rest, lanes * d))
+            put(rest, lanes * d, get(sums, lanes * d) - get(rest, lanes * d))
     for a in range(ctx.invariants):
         for d in range(dim):
             products = splat8(0.0)
@@ -203,8 +203,8 @@ def find_change(ctx, threshold):
         for d in range(dim):
             products, sizes = splat8(0.0), splat8(0.0)
             for chunk in range(ctx.chunks):
-                found = ctx.found + row(ctx, chunk)
-                product = get(found, lanes * d) * get(found, lanes * (dim * (1 + a) + d))
+                sums = ctx.gradients + row(ctx, chunk)
+                product = get(sums, lanes * d) * get(sums, lanes * (dim * (1 + a) + d))
                 term = get(weights, 8 * chunk) * product
                 products += term
                 sizes += abs(term)

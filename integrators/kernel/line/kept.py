@@ -91,7 +91,7 @@ class Kept:
     @property
     def arrays(self) -> tuple[str, ...]:
         """What a checkpoint holds of it, by the names in `LineContext`."""
-        return ("reference", "owed", "active", "found", "alpha", "legendre") if self.names else ()
+        return ("reference", "owed", "active", "gradients", "alpha", "legendre") if self.names else ()
 
     def report(self, context: Any) -> dict[str, Any]:
         """Return what `stats.extra` says of a trajectory."""
@@ -102,10 +102,10 @@ class Kept:
 
     def refusal(self, contexts: tuple[Any, Any], t: float) -> str:
         """Return why the step from t has ended as `NOT_KEPT`: the step of a pair of contexts, or a part."""
-        found = next(context for context in contexts if context.defect != 0.0)
+        culprit = next(context for context in contexts if context.defect != 0.0)
         return (
-            f"{self.names[found.culprit]} is not an invariant: in the step from t = {t!r} the terms of its "
-            f"rate of change do not cancel, but leave {found.defect:.1e} of their size; leave it out."
+            f"{self.names[culprit.culprit]} is not an invariant: in the step from t = {t!r} the terms of its "
+            f"rate of change do not cancel, but leave {culprit.defect:.1e} of their size; leave it out."
         )
 
     def load(self, contexts: tuple[Any, Any], y: Array, par: Array, t0: float) -> None:
@@ -125,10 +125,10 @@ def components(system: System, name: str) -> Mapping[str, Function]:
     problems.errors.InputError
         If there is none of this name, or it depends on time.
     """
-    found = system.components(name)
-    if any(node.flags & T for function in found.values() for node in function.roots):
+    functions = system.components(name)
+    if any(node.flags & T for function in functions.values() for node in function.roots):
         raise InputError(f"the invariant {name!r} of {system.name} depends on time; leave it out.")
-    return found
+    return functions
 
 
 def metric_of(system: System, par: Array) -> Array:

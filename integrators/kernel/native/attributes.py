@@ -74,20 +74,20 @@ def _get(context, builder, typ, value, attr):
 
     def fixed(slot: Any, kind: Any) -> Any:
         # Neither the address of a table nor its sizes change while compiled code runs: loops load them once.
-        found = builder.load(_word(context, builder, value, slot, kind))
-        found.set_metadata("invariant.load", builder.module.add_metadata([]))
-        return found
+        word = builder.load(_word(context, builder, value, slot, kind))
+        word.set_metadata("invariant.load", builder.module.add_metadata([]))
+        return word
 
     sizes = [
         ir.Constant(INTEGER, n) if isinstance(n, int) else fixed(typ.declared.slots[n], types.int64)
         for n in slot.shape
     ]
-    made = context.make_array(kind)(context, builder)
+    array = context.make_array(kind)(context, builder)
     item = ir.Constant(INTEGER, 8)
     strides = [builder.mul(sizes[-1], item), item] if kind.ndim == 2 else [item]
     data = fixed(slot, types.CPointer(kind.dtype))
-    arrayobj.populate_array(made, data, sizes, strides, item, meminfo=None)
-    return made._getvalue()
+    arrayobj.populate_array(array, data, sizes, strides, item, meminfo=None)
+    return array._getvalue()
 
 
 @lower_setattr_generic(MemoryType)

@@ -165,8 +165,8 @@ def build_lowered(text: str) -> bytes:
 def assembly(function: Any, arguments: Sequence[tuple[Any, str]], returns: str = "void") -> str:
     """Return the machine code that `build` makes, as text."""
     with machine.alone():
-        made = _linked(function, arguments, returns)
-        return machine.optimized(made, lambda machine, module: machine.emit_assembly(module))
+        linked = _linked(function, arguments, returns)
+        return machine.optimized(linked, lambda machine, module: machine.emit_assembly(module))
 
 
 def _linked(
@@ -178,5 +178,5 @@ def _linked(
     """Return a module of the `ENTRY` and all that it calls."""
     from integrators.kernel.native import jit  # imports numba
 
-    made = jit.module(function, tuple(kind for kind, _ in arguments))
-    return machine.entered(made, arguments, returns, around)
+    lowered = jit.module(function, tuple(kind for kind, _ in arguments))
+    return machine.entered(lowered, arguments, returns, around)

@@ -18,14 +18,14 @@ Arguments = list[tuple[Any, str]]
 SOURCES = ("simd", "native")
 
 
-def compile_field(system: System, what: emit.Quantity, lanes: int) -> binary.Native:
+def compile_field(system: System, quantity: emit.Quantity, lanes: int) -> binary.Native:
     """Compile one of a system's functions for stage memory, or load it.
 
     Parameters
     ----------
     system : System
         The traced system.
-    what : str or Function
+    quantity : str or Function
         ``"field"``, or ``"force"`` for the second-order form, or another function of the system.
     lanes : int
         Stages per call.
@@ -35,9 +35,9 @@ def compile_field(system: System, what: emit.Quantity, lanes: int) -> binary.Nat
     Native
         Its note is `ON_LANES` or `ONE_BY_ONE`.
     """
-    source = emit.source(system, what, "numba")
+    source = emit.source(system, quantity, "numba")
     name = store.key("field", source.text, str(lanes), binary.sources(*SOURCES))
-    return binary.obtain(name, lambda: build(emit.numba(system, what).py_func, lanes))
+    return binary.obtain(name, lambda: build(emit.numba(system, quantity).py_func, lanes))
 
 
 def build(function: Any, lanes: int) -> tuple[str, bytes]:
@@ -56,7 +56,7 @@ def build(function: Any, lanes: int) -> tuple[str, bytes]:
         return ONE_BY_ONE, build_one_by_one(function, lanes)
 
 
-def assembly(system: System, what: emit.Quantity, lanes: int) -> str:
+def assembly(system: System, quantity: emit.Quantity, lanes: int) -> str:
     """Return the machine code of a field, as text; the arguments are those of `compile_field`.
 
     Raises
@@ -66,7 +66,7 @@ def assembly(system: System, what: emit.Quantity, lanes: int) -> str:
     """
     from numba.core.errors import NumbaError
 
-    function = emit.numba(system, what).py_func
+    function = emit.numba(system, quantity).py_func
     try:
         return binary.assembly(*on_lanes(function, lanes))
     except NumbaError:

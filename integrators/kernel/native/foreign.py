@@ -18,11 +18,11 @@ from problems import emit
 from problems.systems.base import System
 from problems.systems.untraced import Foreign
 
-_made: WeakKeyDictionary[Foreign, dict[int, tuple[int, Any]]] = WeakKeyDictionary()
+_functions: WeakKeyDictionary[Foreign, dict[int, tuple[int, Any]]] = WeakKeyDictionary()
 """The address of each field by lanes, and what keeps it alive: as long as its system is there."""
 
 
-def field_of(system: System, what: emit.Quantity, lanes: int) -> binary.Native:
+def field_of(system: System, quantity: emit.Quantity, lanes: int) -> binary.Native:
     """Return one of a system's functions for stage memory; see `field.compile_field`.
 
     Raises
@@ -32,15 +32,15 @@ def field_of(system: System, what: emit.Quantity, lanes: int) -> binary.Native:
     numba.core.errors.NumbaError
         If a numba function cannot be compiled for arrays of numbers.
     """
-    if not isinstance(system, Foreign) or what != "field":
-        return compile_field(system, what, lanes)
+    if not isinstance(system, Foreign) or quantity != "field":
+        return compile_field(system, quantity, lanes)
     started = perf_counter()
     with binary.lock:  # two of them would leave one thread with the address of what the other throws away
-        made = _made.setdefault(system, {})
-        known = lanes in made
+        compiled = _functions.setdefault(system, {})
+        known = lanes in compiled
         if not known:
-            made[lanes] = (_compiled if system.numba else _called)(system, lanes)
-        address, _ = made[lanes]
+            compiled[lanes] = (_compiled if system.numba else _called)(system, lanes)
+        address, _ = compiled[lanes]
     return binary.Native(address, ONE_BY_ONE, known, perf_counter() - started)
 
 
@@ -105,9 +105,9 @@ def _compiled(system: Foreign, lanes: int) -> tuple[int, Any]:
                 out[d, l] = dy[d]
 
     pointer = types.CPointer(types.float64)
-    made = numba.cfunc(types.void(pointer, pointer, pointer, pointer))(field)
-    address: Any = made.address
-    return address, made
+    function = numba.cfunc(types.void(pointer, pointer, pointer, pointer))(field)
+    address: Any = function.address
+    return address, function
 
 
 def _called(system: Foreign, lanes: int) -> tuple[int, Any]:
@@ -145,7 +145,7 @@ def _called(system: Foreign, lanes: int) -> tuple[int, Any]:
 
     raised.expect_callbacks()
     kind: Callable[..., Any] = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 4)
-    made: Any = kind(field)
-    address = ctypes.cast(made, ctypes.c_void_p).value
+    function: Any = kind(field)
+    address = ctypes.cast(function, ctypes.c_void_p).value
     assert address is not None
-    return address, made
+    return address, function

@@ -57,9 +57,9 @@ def _checked(way: Any) -> Any:
         return int(total)
 
     code = machine.emitted(way.module(summed, (types.int64,)), [(types.int64, "i64")], "i64")
-    found = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)(machine.load(code))(9)
-    if found != 18:
-        raise ArithmeticError(f"a sum of 18 is {found}")
+    answer = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)(machine.load(code))(9)
+    if answer != 18:
+        raise ArithmeticError(f"a sum of 18 is {answer}")
     return way
 
 

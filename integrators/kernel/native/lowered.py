@@ -37,13 +37,13 @@ def get(key: str) -> str | None:
     return None
 
 
-def write(made: Mapping[str, str]) -> None:
+def write(texts: Mapping[str, str]) -> None:
     """Let texts, by their keys, be all that lies there; the first ones are read soonest."""
     FOLDER.mkdir(exist_ok=True)
     for old in FOLDER.glob("*.xz"):
         old.unlink()
     with tarfile.open(_file(), "w:xz", preset=9) as archive:
-        for key, text in made.items():
+        for key, text in texts.items():
             content = text.encode("ascii")
             member = tarfile.TarInfo(key)
             member.size = len(content)

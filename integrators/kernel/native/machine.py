@@ -24,20 +24,20 @@ if hasattr(os, "register_at_fork"):
 _engines: list[Any] = []  # an engine owns its code: none may be collected
 
 
-def emitted(made: tuple[Any, str], arguments: Sequence[tuple[Any, str]], returns: str) -> bytes:
+def emitted(lowered: tuple[Any, str], arguments: Sequence[tuple[Any, str]], returns: str) -> bytes:
     """Return the object file of what `jit.module` has returned; the rest as for `build`."""
     with alone():
-        return optimized(entered(made, arguments, returns), object_file)
+        return optimized(entered(lowered, arguments, returns), object_file)
 
 
 def entered(
-    made: tuple[Any, str],
+    lowered: tuple[Any, str],
     arguments: Sequence[tuple[Any, str]],
     returns: str,
     around: Callable[[str], str] | None = None,
 ) -> Any:
     """Return the module with an `ENTRY`, which alone is seen from outside."""
-    module, inner = made
+    module, inner = lowered
     entry = around(inner) if around else _entry(inner, [text for _, text in arguments], returns)
     module.link_in(llvm.parse_assembly(entry))
     for value in [*module.functions, *module.global_variables]:

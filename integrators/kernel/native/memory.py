@@ -131,12 +131,12 @@ class Array(Slot):
     *shape : int or str
         Numbers, or names of `Integer` slots, of the same part or of the memory; their product is the length.
         None: the array is `Memory.point`\ ed to.
-    of : {float, int}
+    kind : {float, int}
         What it holds.
     """
 
-    def __init__(self, *shape: int | str, of: type = float):
-        self.shape, self.of = shape, of
+    def __init__(self, *shape: int | str, kind: type = float):
+        self.shape, self.of = shape, kind
 
     @overload
     def __get__(self, memory: None, owner: type) -> Self: ...
@@ -149,8 +149,8 @@ class Array(Slot):
             return pointed
         # Compiled code may have exchanged it for another.
         start = memory._first + (int(memory.words[self.place]) - memory.address) // 8
-        found = memory._memory[start : memory._ends[start]]
-        return found if self.of is float else found.view(np.int64)
+        words = memory._memory[start : memory._ends[start]]
+        return words if self.of is float else words.view(np.int64)
 
 
 class Table(Array):
@@ -179,8 +179,8 @@ class Within(Generic[Declared]):
     def __get__(self, memory: "Memory | None", owner: type) -> Any:
         if memory is None:
             return self.declared
-        made = vars(memory)[self.name] = self.declared(memory, self)  # what is looked up the next time
-        return made
+        view = vars(memory)[self.name] = self.declared(memory, self)  # what is looked up the next time
+        return view
 
 
 class _Slots:
@@ -202,20 +202,20 @@ class _Slots:
     words: Integers
 
     def __init_subclass__(cls) -> None:
-        own = {name: one for name, one in vars(cls).items() if isinstance(one, Slot | Within)}
+        own = {name: slot for name, slot in vars(cls).items() if isinstance(slot, Slot | Within)}
         if twice := sorted(own.keys() & (cls.slots.keys() | cls.part_of.keys())):
             raise TypeError(f"{cls.__name__} declares again what its base has: {', '.join(twice)}.")
         slots, parts, fields = dict(cls.slots), dict(cls.part_of), []
-        for name, one in own.items():
-            one.place = cls._size
-            if isinstance(one, Slot):
-                slots[name] = one
+        for name, slot in own.items():
+            slot.place = cls._size
+            if isinstance(slot, Slot):
+                slots[name] = slot
                 cls._size += 1
-                fields.append((name, getattr(one, "kind", ctypes.c_int64)))
+                fields.append((name, getattr(slot, "kind", ctypes.c_int64)))
             else:
-                parts[name] = one
-                cls._size += one.declared._size
-                fields.append((name, one.declared._structure))
+                parts[name] = slot
+                cls._size += slot.declared._size
+                fields.append((name, slot.declared._structure))
         cls.slots, cls.part_of = slots, parts
         base = getattr(cls, "_structure", ctypes.Structure)
         # whose fields are read at once

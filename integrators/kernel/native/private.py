@@ -67,14 +67,14 @@ class _Types(Context):
 
 
 class _Target(registry.CPUTarget):
-    _made: Any = None
+    _context: Any = None
 
     @property
     def target_context(self) -> Any:
-        if self._made is None:
-            self._made = cpu.CPUContext(self.typing_context, self._target_name)
-            self._made._internal_codegen = _Codegen(NAME)
-        return self._made
+        if self._context is None:
+            self._context = cpu.CPUContext(self.typing_context, self._target_name)
+            self._context._internal_codegen = _Codegen(NAME)
+        return self._context
 
     @cached_property
     def _types(self) -> _Types:
@@ -90,7 +90,7 @@ class _Passes(CompilerBase):
 
     def define_pipelines(self) -> list[PassManager]:
         passes = PassManager(NAME)
-        for one in (
+        for pass_ in (
             untyped_passes.TranslateByteCode,
             untyped_passes.FixupArgs,
             untyped_passes.IRProcessing,
@@ -100,7 +100,7 @@ class _Passes(CompilerBase):
             typed_passes.NativeLowering,
             typed_passes.NoPythonBackend,
         ):
-            passes.add_pass(one, one.__name__)
+            passes.add_pass(pass_, pass_.__name__)
         passes.finalize()
         return [passes]
 
@@ -156,14 +156,14 @@ def module(function: Any, kinds: tuple[Any, ...]) -> tuple[Any, str]:
         If it cannot be compiled for these types.
     """
     function.compile(kinds)
-    made = function.overloads[kinds]
-    libraries = [made.library]
+    overload = function.overloads[kinds]
+    libraries = [overload.library]
     for library in libraries:
-        libraries += [one for one in library._linking_libraries if one not in libraries]
+        libraries += [library_ for library_ in library._linking_libraries if library_ not in libraries]
     first, *rest = [library._final_module.clone() for library in libraries]
     for other in rest:
         for value in other.functions:
             if not value.is_declaration and value.linkage == llvm.Linkage.external:
                 value.linkage = "linkonce_odr"  # several may bring the same helper
         first.link_in(other)
-    return first, made.fndesc.llvm_func_name
+    return first, overload.fndesc.llvm_func_name

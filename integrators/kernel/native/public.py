@@ -34,15 +34,15 @@ def module(function: Any, kinds: tuple[Any, ...]) -> tuple[Any, str]:
         If it cannot be compiled for these types.
     """
     function.compile(kinds)
-    made = llvm.parse_assembly(function.inspect_llvm(kinds))
-    names = {one.name for one in made.functions if not one.is_declaration}
-    (name,) = (one for one in names if f"cfunc.{one}" in names)
-    return _uncounted(made), name
+    parsed = llvm.parse_assembly(function.inspect_llvm(kinds))
+    names = {function_.name for function_ in parsed.functions if not function_.is_declaration}
+    (name,) = (function_ for function_ in names if f"cfunc.{function_}" in names)
+    return _uncounted(parsed), name
 
 
-def _uncounted(made: Any) -> Any:
+def _uncounted(parsed: Any) -> Any:
     """Return a module whose reference counts are nobody's: it needs nothing of numba when it is loaded."""
-    text = str(made)
+    text = str(parsed)
     for name in COUNTING:
         text = re.sub(
             rf"(?ms)^define [^\n]*@{name}\(.*?^\}}\n", f"define void @{name}(ptr %0) {{ ret void }}\n", text

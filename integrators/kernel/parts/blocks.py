@@ -8,8 +8,8 @@ class Blocks(Part):
 
     count = Integer()
     groups = Integer()
-    of_row = Array(of=int)  # the block of each row
-    group = Array(of=int)  # of each block
+    of_row = Array(kind=int)  # the block of each row
+    group = Array(kind=int)  # of each block
     weights = Array("padded")  # by row: 1 / size of its block
     floored_weights = Array("padded")  # the same, small blocks raised to a part of the largest
     size = Array("count")

@@ -24,8 +24,8 @@ def indices(*lanes: int) -> Any:
 def splat(builder: Any, scalar: Any, count: int) -> Any:
     """Return ``scalar`` in every lane."""
     none = ir.Constant(vector(count), ir.Undefined)
-    one = builder.insert_element(none, scalar, ir.Constant(ir.IntType(32), 0))
-    return builder.shuffle_vector(one, none, indices(*[0] * count))
+    first = builder.insert_element(none, scalar, ir.Constant(ir.IntType(32), 0))
+    return builder.shuffle_vector(first, none, indices(*[0] * count))
 
 
 def llvm_call(builder: Any, name: str, *values: Any) -> Any:

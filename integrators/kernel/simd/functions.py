@@ -97,8 +97,8 @@ def _tan(x: Value) -> Value:
 def _exp(x: Value) -> Value:
     b = x.builder
     # Beyond these the result is 0 or infinite anyhow.
-    y = x.of(-746.0).where(x.compare("<", -746.0), x)
-    y = x.of(710.0).where(x.compare(">", 710.0), y)
+    y = x.constant(-746.0).where(x.compare("<", -746.0), x)
+    y = x.constant(710.0).where(x.compare(">", 710.0), y)
     shifted = y.fma(1.0 / math.log(2.0), SHIFT)
     n = -(shifted - SHIFT)
     whole = n.fma(LN2[0], y)
@@ -130,7 +130,7 @@ def _log(x: Value) -> Value:
     rest = z * z.polynomial(LOGARITHM)
     low = (s * (half + rest)) + k * LN2_SHORT[1]
     value = k * LN2_SHORT[0] - ((half - low) - f)
-    value = x.of(-math.inf).where(x.compare("==", 0.0), value)
+    value = x.constant(-math.inf).where(x.compare("==", 0.0), value)
     value = value.where(x.compare(">=", 0.0), math.nan)
     return x.where(x.compare("==", math.inf), value)
 
@@ -149,7 +149,7 @@ def _function(name: str, formula: Any, limit: float | None) -> Any:
             argument = Value(inner, function.args[0])
             value = formula(argument)
             if limit is not None:
-                mask = inner.fcmp_unordered(">", argument.absolute().value, argument.of(limit).value)
+                mask = inner.fcmp_unordered(">", argument.absolute().value, argument.constant(limit).value)
                 bits: Any = inner.bitcast(mask, ir.IntType(kind.count))
                 far = inner.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
                 with inner.if_then(far, likely=False):

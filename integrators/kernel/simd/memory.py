@@ -129,8 +129,8 @@ FOLDS = [
 """How eight vectors become four, two and one, by adding halves: their number, and which lanes of two."""
 
 
-def _halves(builder: Any, one: Any, two: Any, places: Any) -> list[Any]:
-    return [builder.shuffle_vector(one, two, half) for half in places]
+def _halves(builder: Any, first: Any, second: Any, places: Any) -> list[Any]:
+    return [builder.shuffle_vector(first, second, half) for half in places]
 
 
 @intrinsic
@@ -157,8 +157,8 @@ def sums_and_rests(typing, v0, v1, v2, v3, v4, v5, v6, v7):
         first, second, last = FOLDS
         four = [builder.fadd(*_halves(builder, args[i], args[i + 4], first[1:])) for i in range(4)]
         two = [added(builder, *_halves(builder, four[i], four[i + 2], second[1:])) for i in range(2)]
-        (one, lost), (other, more) = two
-        total, rest = added(builder, *_halves(builder, one, other, last[1:]))
+        (high, lost), (other, more) = two
+        total, rest = added(builder, *_halves(builder, high, other, last[1:]))
         less = builder.fadd(*_halves(builder, lost, more, last[1:]))
         return context.make_tuple(builder, sig.return_type, [total, builder.fadd(rest, less)])
 
@@ -223,8 +223,8 @@ def _caller(arguments: int, returns: Any = types.void) -> Any:
     def generate(context, builder, sig, args):
         result = ir.VoidType() if returns == types.void else INTEGER
         kind = ir.FunctionType(result, [value.type for value in args[1:]])
-        found = builder.call(builder.inttoptr(args[0], kind.as_pointer()), args[1:])
-        return context.get_dummy_value() if returns == types.void else found
+        returned = builder.call(builder.inttoptr(args[0], kind.as_pointer()), args[1:])
+        return context.get_dummy_value() if returns == types.void else returned
 
     def two(typing, function, a, b):
         return signature(returns, types.int64, a, b), generate

@@ -39,26 +39,26 @@ class Value:
         self.builder, self.value = builder, value
         self.count = value.type.count
 
-    def _of(self, other: "Value | float") -> Any:
+    def _operand(self, other: "Value | float") -> Any:
         if isinstance(other, Value):
             return other.value
         return ir.Constant(vector(self.count), [float(other)] * self.count)
 
-    def of(self, number: float) -> "Value":
+    def constant(self, number: float) -> "Value":
         """Return the number in every lane."""
-        return self._make(self._of(number))
+        return self._make(self._operand(number))
 
     def _make(self, value: Any) -> "Value":
         return Value(self.builder, value)
 
     def __add__(self, other: "Value | float") -> "Value":
-        return self._make(self.builder.fadd(self.value, self._of(other)))
+        return self._make(self.builder.fadd(self.value, self._operand(other)))
 
     def __sub__(self, other: "Value | float") -> "Value":
-        return self._make(self.builder.fsub(self.value, self._of(other)))
+        return self._make(self.builder.fsub(self.value, self._operand(other)))
 
     def __rsub__(self, other: float) -> "Value":
-        return self._make(self.builder.fsub(self._of(other), self.value))
+        return self._make(self.builder.fsub(self._operand(other), self.value))
 
     def __radd__(self, other: float) -> "Value":
         return self + other
@@ -67,24 +67,26 @@ class Value:
         return self * other
 
     def __rtruediv__(self, other: float) -> "Value":
-        return self._make(self.builder.fdiv(self._of(other), self.value))
+        return self._make(self.builder.fdiv(self._operand(other), self.value))
 
     def __mul__(self, other: "Value | float") -> "Value":
-        return self._make(self.builder.fmul(self.value, self._of(other)))
+        return self._make(self.builder.fmul(self.value, self._operand(other)))
 
     def __truediv__(self, other: "Value | float") -> "Value":
-        return self._make(self.builder.fdiv(self.value, self._of(other)))
+        return self._make(self.builder.fdiv(self.value, self._operand(other)))
 
     def __neg__(self) -> "Value":
         return self._make(self.builder.fneg(self.value))
 
     def fma(self, factor: "Value | float", term: "Value | float") -> "Value":
         """Return the value times a factor plus a term, rounded once."""
-        return self._make(llvm_call(self.builder, "fma", self.value, self._of(factor), self._of(term)))
+        return self._make(
+            llvm_call(self.builder, "fma", self.value, self._operand(factor), self._operand(term))
+        )
 
     def polynomial(self, coefficients: Any) -> "Value":
         """Horner's scheme, lowest coefficient first."""
-        result = self._make(self._of(coefficients[-1]))
+        result = self._make(self._operand(coefficients[-1]))
         for coefficient in reversed(coefficients[:-1]):
             result = result.fma(self, coefficient)
         return result
@@ -95,10 +97,10 @@ class Value:
 
     def where(self, condition: Any, other: "Value | float") -> "Value":
         """Choose the value where the condition holds, else ``other``."""
-        return self._make(self.builder.select(condition, self.value, self._of(other)))
+        return self._make(self.builder.select(condition, self.value, self._operand(other)))
 
     def compare(self, symbol: str, other: "Value | float") -> Any:
-        return self.builder.fcmp_ordered(symbol, self.value, self._of(other))
+        return self.builder.fcmp_ordered(symbol, self.value, self._operand(other))
 
     def __lt__(self, other: "Value | float") -> Condition:
         return Condition(self.builder, self.compare("<", other))

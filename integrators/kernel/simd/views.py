@@ -38,13 +38,13 @@ class Rows(types.Type):
 class Numbers(types.Type):
     """Memory with a number every ``stride`` words: ``view[i]`` is a double, or an integer."""
 
-    def __init__(self, stride: int = 1, of: Any = types.float64):
-        self.stride, self.of = stride, of
-        super().__init__(name=f"Numbers({stride}, {of})")
+    def __init__(self, stride: int = 1, kind: Any = types.float64):
+        self.stride, self.of = stride, kind
+        super().__init__(name=f"Numbers({stride}, {kind})")
 
 
 DOUBLES = Numbers()
-INTEGERS = Numbers(of=types.int64)
+INTEGERS = Numbers(kind=types.int64)
 
 
 @register_model(Rows)

@@ -182,10 +182,10 @@ def start_onward(ctx):
     ratio = ctx.h / ctx.length
     if not 0.5 <= ratio <= 2.0:
         return False
-    found = int(octaves(ratio) + 0.5)
-    if ctx.length * ratio_at(found) != ctx.h:
+    index = int(octaves(ratio) + 0.5)
+    if ctx.length * ratio_at(index) != ctx.h:
         return False
-    product_for_one(ctx, ctx.tables.extrapolation + 8 * ctx.tables.matrix_size * found)
+    product_for_one(ctx, ctx.tables.extrapolation + 8 * ctx.tables.matrix_size * index)
     ctx.solver.predicted = 1
     return True
 

@@ -9,7 +9,7 @@ from integrators.kernel.step.sample import part_step, write
 
 
 @compiled
-def entry(what, ctx, partial, between, count, times, targets, parts, first, out, budget):
+def entry(operation, ctx, partial, between, count, times, targets, parts, first, out, budget):
     """Do what ``what`` names; all arguments are integers or addresses.
 
     RESET: put the trajectory at the state at ``out``. ADVANCE: see `loop.advance`.
@@ -18,12 +18,12 @@ def entry(what, ctx, partial, between, count, times, targets, parts, first, out,
     the length of the last one from there, or 0.
     """
     t, n, p, y = doubles(times), integers(targets), doubles(parts), doubles(out)
-    if what == RESET:
+    if operation == RESET:
         reset(context(ctx), y)
         return DONE
-    if what == ADVANCE:
+    if operation == ADVANCE:
         return advance(context(ctx), context(partial), between, count, t, n, p, first, y, budget)
-    if what == PART:
+    if operation == PART:
         outcome = part_step(context(ctx), context(partial), p[0], p[1])
         if outcome == DONE:
             write(context(partial), context(partial).next_state, y)

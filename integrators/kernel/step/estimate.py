@@ -81,7 +81,7 @@ def of_two(table, which, low, high):
 @compiled
 def take_coefficients_of_two(ctx):
     """As `take_coefficients`, for two times eight stages: the same sums, with each value loaded once."""
-    found, table, values = ctx.estimate.coefficients, ctx.estimate.estimators, ctx.values
+    gammas, table, values = ctx.estimate.coefficients, ctx.estimate.estimators, ctx.values
     for d in range(ctx.rows):
         x, y = get(values, 16 * d), get(values, 16 * d + 8)
         low = (
@@ -96,7 +96,7 @@ def take_coefficients_of_two(ctx):
             of_two(table, BEFORE_LAST, x, y),
             of_two(table, LAST, x, y),
         )
-        put(found, 8 * d, abs(sums(*low, *high)))
+        put(gammas, 8 * d, abs(sums(*low, *high)))
 
 
 @for_both_widths
@@ -119,7 +119,7 @@ def compare_ends(ctx):
     As their polynomials say. It is done last, since the length of the next step has not to wait for it.
     """
     kinks = ctx.kinks
-    found, borders, behind, gaps = ctx.estimate.coefficients, kinks.borders, kinks.borders_behind, kinks.gaps
+    gammas, borders, behind, gaps = ctx.estimate.coefficients, kinks.borders, kinks.borders_behind, kinks.gaps
     lasts, lasts_behind = kinks.lasts, kinks.lasts_behind
     table, values, two = ctx.estimate.estimators, ctx.values, ctx.route == 16
     apart = False
@@ -131,7 +131,7 @@ def compare_ends(ctx):
             start, end = coefficient(ctx, d, AT_START), coefficient(ctx, d, AT_END)
         put(borders, 8 * d, end)
         gaps[d] = far = abs(total(start - get(behind, 8 * d)))
-        lasts[d] = last = greatest(found[8 * d + BEFORE_LAST], found[8 * d + LAST])
+        lasts[d] = last = greatest(gammas[8 * d + BEFORE_LAST], gammas[8 * d + LAST])
         apart |= is_gap(far, last, lasts_behind[d])
     kinks.apart = 1 if apart else 0
 
@@ -226,10 +226,10 @@ def note_what_stays(ctx):
     """Note for each block the largest last coefficient that is as large as at a kink; 0: none."""
     abrupt = ctx.estimate.abrupt
     for d in range(ctx.rows):
-        found = ctx.estimate.coefficients + 8 * d
-        low = lowest(found[GAMMA_1], found[GAMMA_2], found[GAMMA_3])
-        high = greatest(found[BEFORE_LAST], found[LAST])
-        if is_doubtful(low, high, ctx.kinks.doubt) and stays(ctx, d, found[LAST]):
+        gammas = ctx.estimate.coefficients + 8 * d
+        low = lowest(gammas[GAMMA_1], gammas[GAMMA_2], gammas[GAMMA_3])
+        high = greatest(gammas[BEFORE_LAST], gammas[LAST])
+        if is_doubtful(low, high, ctx.kinks.doubt) and stays(ctx, d, gammas[LAST]):
             b = ctx.blocks.of_row[d]
             abrupt[b] = greatest(abrupt[b], high)
 
@@ -360,21 +360,21 @@ def measure_blocks(ctx):
         top[g] = steepest[g] = 0.0
     doubtful, changing = False, False
     for d in range(ctx.rows):
-        b, found = blocks.of_row[d], ctx.estimate.coefficients + 8 * d
+        b, gammas = blocks.of_row[d], ctx.estimate.coefficients + 8 * d
         low, high, slope, error, defect = judged(
-            found[GAMMA_0],
-            found[GAMMA_1],
-            found[GAMMA_2],
-            found[GAMMA_3],
-            found[BEFORE_ERROR],
-            found[AT_ERROR],
-            found[BEFORE_LAST],
-            found[LAST],
+            gammas[GAMMA_0],
+            gammas[GAMMA_1],
+            gammas[GAMMA_2],
+            gammas[GAMMA_3],
+            gammas[BEFORE_ERROR],
+            gammas[AT_ERROR],
+            gammas[BEFORE_LAST],
+            gammas[LAST],
             error_decay,
             defect_decay,
         )
         doubtful |= is_doubtful(low, high, doubt)
-        changing |= changes(low, high, found[GAMMA_0])
+        changing |= changes(low, high, gammas[GAMMA_0])
         scale[b] = greatest(scale[b], size(momentum(ctx, d)) + h * slope)
         slopes[b] = greatest(slopes[b], slope)
         gamma_error[b] = greatest(gamma_error[b], error)
@@ -402,16 +402,16 @@ def log_decay(ctx):
     h = abs(ctx.h)
     slowest = -INFINITY
     for d in range(ctx.rows):
-        b, found = ctx.blocks.of_row[d], ctx.estimate.coefficients + 8 * d
-        last, size = found[GAMMA_3], block_size(ctx, b)
+        b, gammas = ctx.blocks.of_row[d], ctx.estimate.coefficients + 8 * d
+        last, size = gammas[GAMMA_3], block_size(ctx, b)
         if steps == 3:
-            last = next_coefficient(last, found[GAMMA_2], ctx.estimate.error_decay)
+            last = next_coefficient(last, gammas[GAMMA_2], ctx.estimate.error_decay)
         if last > RESTLESS * ctx.estimate.slope[b]:
             slope = slope_beside(ctx.estimate.slope[b], steepest_beside(ctx, b), ctx.estimate.least_slope)
             if local_error(h, last, slope, size) <= RESTING * ctx.controller.allowed_error:
                 continue
         if is_visible(
-            h, next_coefficient(found[AT_ERROR], found[BEFORE_ERROR], ctx.estimate.error_decay), size
+            h, next_coefficient(gammas[AT_ERROR], gammas[BEFORE_ERROR], ctx.estimate.error_decay), size
         ):
             return 0.0
         if is_visible(h, last, size):
@@ -428,10 +428,10 @@ def estimate_implicit(ctx):
     kept = ctx.values
     ctx.values = ctx.scratch.sums
     evaluate(ctx)
-    found = estimate(ctx)
+    result = estimate(ctx)
     ctx.values = kept
     ctx.counters.evaluations += ctx.k
-    return found
+    return result
 
 
 @compiled

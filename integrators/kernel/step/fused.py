@@ -38,7 +38,7 @@ ROWS = 4
 """Components of a stage up to which whole sweeps are compiled with the field."""
 
 
-def compile_sweeps(system: System, what: emit.Quantity, lanes: int, rows: int) -> binary.Native:
+def compile_sweeps(system: System, quantity: emit.Quantity, lanes: int, rows: int) -> binary.Native:
     """Compile ``void(context, count, after)``, or load it: for a field on lanes, and factors in the matrix.
 
     It does ``count`` sweeps. With ``after`` = `MEASURE`, for one sweep or more, `Scratch.old_stages` then
@@ -52,13 +52,13 @@ def compile_sweeps(system: System, what: emit.Quantity, lanes: int, rows: int) -
     rows : int
         Components of a stage.
     """
-    source = emit.source(system, what, "numba")
+    source = emit.source(system, quantity, "numba")
     modules = binary.sources(*field.SOURCES, "parts", "context", "step/fused")
     by_columns = lanes == WIDTH or machine.many_registers()
     name = store.key("sweeps", source.text, str(lanes), str(rows), str(by_columns), modules)
 
     def make() -> tuple[str, bytes]:
-        function, arguments = field.on_lanes(emit.numba(system, what).py_func, lanes)
+        function, arguments = field.on_lanes(emit.numba(system, quantity).py_func, lanes)
         return field.ON_LANES, binary.build(
             function, arguments, around=lambda inner: sweeps(inner, lanes, rows, by_columns)
         )
@@ -123,7 +123,7 @@ def sweeps(inner: str, lanes: int, rows: int, by_columns: bool) -> str:
     starts = [[get(base, lanes * d + WIDTH * part, eight) for part in parts] for d in range(rows)]
     states = [splat(b, get(state, d, DOUBLE), WIDTH) for d in range(rows)]
     first = [get(q, lanes * d, whole) for d in range(rows)]
-    zero, one = number(0), number(1)
+    zero, unity = number(0), number(1)
     evaluates = b.icmp_signed("==", after, number(EVALUATE))
     entry, loop, product, end, evaluated = (
         b.block,
@@ -138,7 +138,7 @@ def sweeps(inner: str, lanes: int, rows: int, by_columns: bool) -> str:
     for d in range(rows):
         put(old[d], at_stages, lanes * d)
     b.call(field, [result, exception, times, at_stages, par, at_values])
-    found = [get(at_values, lanes * d, whole) for d in range(rows)]
+    vectors = [get(at_values, lanes * d, whole) for d in range(rows)]
     b.cbranch(b.icmp_signed(">", left, zero), product, evaluated)
 
     b.position_at_end(product)
@@ -150,7 +150,7 @@ def sweeps(inner: str, lanes: int, rows: int, by_columns: bool) -> str:
         for j in range(lanes):
             columns = [get(matrix, lanes * WIDTH * part + WIDTH * j, eight) for part in parts]
             for d in range(rows):
-                factor = lane(found[d], j)
+                factor = lane(vectors[d], j)
                 for part in parts:
                     sums[d, part].add(columns[part], factor)
         return [joined([b.fadd(states[d], sums[d, part].total()) for part in parts]) for d in range(rows)]
@@ -172,14 +172,14 @@ def sweeps(inner: str, lanes: int, rows: int, by_columns: bool) -> str:
             total.add(get(columns, WIDTH * j, eight), splat(b, get(factors, j, DOUBLE), WIDTH))
         level = splat(b, b.load(b.gep(state, [d])), WIDTH)
         put(b.fadd(level, total.total()), b.gep(at_stages, [start]), 0)
-        after_it = b.add(i, one)
+        after_it = b.add(i, unity)
         i.add_incoming(after_it, b.block)
         b.cbranch(b.icmp_unsigned("<", after_it, number(rows * len(parts))), inside, done)
         b.position_at_end(done)
         return [get(at_stages, lanes * d, whole) for d in range(rows)]
 
     new = all_at_once() if by_columns else eight_by_eight()
-    fewer = b.sub(left, one)
+    fewer = b.sub(left, unity)
     left.add_incoming(count, entry)
     left.add_incoming(fewer, b.block)
     for d in range(rows):
@@ -190,13 +190,13 @@ def sweeps(inner: str, lanes: int, rows: int, by_columns: bool) -> str:
     b.position_at_end(evaluated)
     for d in range(rows):
         put(old[d], q, lanes * d)
-        put(found[d], f, lanes * d)
+        put(vectors[d], f, lanes * d)
     b.ret_void()
 
     b.position_at_end(end)
     for d in range(rows):
         put(new[d], q, lanes * d)
-        put(found[d], f, lanes * d)
+        put(vectors[d], f, lanes * d)
     with b.if_then(b.icmp_signed("!=", after, zero)):
         top = ir.Constant(eight, [0.0] * WIDTH)
         for d in range(rows):

@@ -96,7 +96,7 @@ def set_states(ctx, low, width):
 def matters(ctx, low, width):
     """Whether beyond the surface the field is farther from its polynomial than is negligible."""
     surfaces = ctx.surfaces
-    lanes, sides, found = ctx.lanes, surfaces.between, ctx.estimate.coefficients
+    lanes, sides, gammas = ctx.lanes, surfaces.between, ctx.estimate.coefficients
     values = ctx.stages  # the solved step does not need them any more
     call_field(ctx.field, surfaces.times, ctx.scratch.sums, ctx.par, values)
     ctx.counters.evaluations += lanes
@@ -104,7 +104,7 @@ def matters(ctx, low, width):
     least = ctx.kinks.negligible / (abs(ctx.h) * width * (lanes - 1))
     for d in range(ctx.rows):
         i = 8 * d
-        smooth = BESIDE * max(max(found[i + 4], found[i + 5]), max(found[i + 6], found[i + 7]))
+        smooth = BESIDE * max(max(gammas[i + 4], gammas[i + 5]), max(gammas[i + 6], gammas[i + 7]))
         most = max(smooth, least * block_size(ctx, ctx.blocks.of_row[d]))
         for lane in range(lanes):
             far = abs(values[lanes * d + lane] - polynomial(ctx, d, low + width * lane))

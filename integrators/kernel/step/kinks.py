@@ -74,13 +74,13 @@ def jumps_at_an_end(ctx, suspect):
 def count(ctx, t, h):
     """Count the place of a kink in the step from t of length h."""
     kinks = ctx.kinks
-    found, end = kinks.count, kinks.end
-    if found == 0 or (t - end) * h >= 0.0:
-        found += 1
-        kinks.count = found
+    number, end = kinks.count, kinks.end
+    if number == 0 or (t - end) * h >= 0.0:
+        number += 1
+        kinks.count = number
         kinks.end = t + h
-    if found <= KINKS_KEPT:
-        place = kinks.places + 2 * (found - 1)
+    if number <= KINKS_KEPT:
+        place = kinks.places + 2 * (number - 1)
         place[0] = t
         place[1] = h
 

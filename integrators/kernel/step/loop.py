@@ -115,13 +115,13 @@ def advance(ctx, partial, between, count, times, targets, parts, first, out, bud
     Returns
     -------
     int
-        The outcome; `Context.made` tells how many samples are made.
+        The outcome; `Context.samples_written` tells how many samples are made.
     """
     dim = dimension(ctx)
     if ctx.varying:
         shorten_first(ctx)
     for i in range(first, count):
-        ctx.made = i
+        ctx.samples_written = i
         outcome = UNSEEN
         while outcome == UNSEEN:
             if ctx.varying:
@@ -134,7 +134,7 @@ def advance(ctx, partial, between, count, times, targets, parts, first, out, bud
                 outcome = sample(ctx, partial, between, times[i], part, out + dim * i)
         if outcome != DONE:
             return outcome
-    ctx.made = count
+    ctx.samples_written = count
     return DONE
 
 
@@ -145,20 +145,20 @@ def take_steps(ctx, times, out, budget):
     None goes beyond times[0]. With a budget of 0, only look whether a step remains to be taken.
     """
     dim, end = dimension(ctx), times[0]
-    made = 0
+    count = 0
     shorten_first(ctx)
     while True:
-        ctx.made = made
+        ctx.samples_written = count
         taken = ctx.counters.steps
         outcome = DONE
-        over = remaining(ctx, end) == 0.0 or made == budget > 0
+        over = remaining(ctx, end) == 0.0 or count == budget > 0
         if over and arrived(ctx):
             return DONE if remaining(ctx, end) == 0.0 else BUDGET
         if not over:
             outcome = ready(ctx)
         if ctx.counters.steps < taken:
-            made -= 1
-            ctx.made = made
+            count -= 1
+            ctx.samples_written = count
         if outcome != DONE:
             return outcome
         if over or (watched(ctx) and not holds(ctx)):
@@ -176,12 +176,12 @@ def take_steps(ctx, times, out, budget):
         take(ctx)
         if ctx.events.acting:
             outcome = act(ctx)
-        times[made] = ctx.t0
-        write(ctx, ctx.state, out + dim * made)
+        times[count] = ctx.t0
+        write(ctx, ctx.state, out + dim * count)
         followed(ctx, ctx, STATE)
-        made += 1
+        count += 1
         if outcome != DONE:
-            ctx.made = made
+            ctx.samples_written = count
             return outcome
 
 
@@ -196,7 +196,7 @@ def reset(ctx, start):
         put(ctx.state, 8 * i, splat8(0.0))
         put(ctx.error, 8 * i, splat8(0.0))
     read(ctx, ctx.state, start)
-    ctx.made = 0
+    ctx.samples_written = 0
     begin_anew(ctx)
 
 

@@ -21,14 +21,14 @@ SMALL = 1e-16
 
 @compiled
 def evaluate_energy(ctx, state):
-    """Set `Energy.found` to the gradient at a state, and then the energy; return that."""
+    """Set `Energy.outputs` to the gradient at a state, and then the energy; return that."""
     energy = ctx.energy
     rows = energy.rows - 1
-    places, given, found = energy.places, energy.state, energy.found
+    places, given, outputs = energy.places, energy.state, energy.outputs
     for i in range(rows):
         put(given, 8 * i, splat8(state[places[i]]))
-    call_field(energy.code, ctx.times, given, ctx.par, found)
-    return found[8 * rows]
+    call_field(energy.code, ctx.times, given, ctx.par, outputs)
+    return outputs[8 * rows]
 
 
 @compiled
@@ -48,7 +48,7 @@ def take_energy(ctx):
     top = 0.0
     for i in range(energy.rows - 1):
         first = i - i % energy.width
-        top = max(top, block_size(ctx, first) * abs(energy.found[8 * i]))
+        top = max(top, block_size(ctx, first) * abs(energy.outputs[8 * i]))
     energy.scale = 1.0 / top if top > SMALLEST else 1.0
 
 
@@ -57,7 +57,7 @@ def project_onto_energy(ctx):
     """Move the next state to the energy `Energy.start`; leave it where its energy cannot be changed so."""
     energy = ctx.energy
     rows, width, scale = energy.rows - 1, energy.width, energy.scale
-    places, slope, state, error = energy.places, energy.found, ctx.next_state, ctx.next_error
+    places, slope, state, error = energy.places, energy.outputs, ctx.next_state, ctx.next_error
     for _ in range(MOST_CORRECTIONS):
         gap = evaluate_energy(ctx, state) - energy.start
         steepness = 0.0

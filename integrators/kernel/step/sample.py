@@ -179,12 +179,12 @@ def stop_at(ctx, partial, t):
 
 
 @compiled
-def followed(ctx, step, what):
+def followed(ctx, step, operation):
     """Let vectors that follow ``ctx`` know of ``what`` of a step, whole or partial; return the outcome."""
     if ctx.follow == 0:
         return DONE
-    step.made = ctx.made
-    return call_follow(ctx.follow, what, step, ctx.follow_memory)
+    step.samples_written = ctx.samples_written
+    return call_follow(ctx.follow, operation, step, ctx.follow_memory)
 
 
 @compiled

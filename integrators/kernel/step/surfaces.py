@@ -274,8 +274,8 @@ def leave(ctx):
         for d in range(rows):
             scratch.sums[lanes * d + 1] += move * values[lanes * d]
         call_field(surfaces.code, surfaces.times, scratch.sums, ctx.par, surfaces.between)
-        found, i = surfaces.between, lanes * surfaces.row
-        leaves = found[1] == found[0] and abs(found[i + 1]) >= abs(found[i])
+        between, i = surfaces.between, lanes * surfaces.row
+        leaves = between[1] == between[0] and abs(between[i + 1]) >= abs(between[i])
     for call in range(ctx.calls):
         for d in range(rows):
             value, start = values[lanes * d], lanes * (ctx.padded * call + d)

@@ -197,7 +197,7 @@ def take_over(ctx):
 
 
 @compiled
-def learn(ctx):
+def set_hold(ctx):
     """Set `Implicit.held`, the steps to wait for the implicit solver, when that has given way again.
 
     If it did so as soon as it might, steps have not become longer.
@@ -279,7 +279,7 @@ def ready(ctx):
         implicit = ctx.implicit.active
         outcome = attempt(ctx, h)
         if implicit and ctx.implicit.active == 0:
-            learn(ctx)
+            set_hold(ctx)
         ctx.solved = UNSOLVED
         if outcome == NOT_KEPT:
             return outcome
@@ -334,11 +334,11 @@ def accepts(ctx, outcome, iterations, implicit):
         return False
     good = is_good(error, controller.allowed_error, defect, controller.allowed_defect)
     if surfaces.code and (surfaces.locating or (surfaces.across != NO_SURFACE and not good)):
-        found = locate(ctx, outcome, good)
-        if found == AGAIN:
+        place = locate(ctx, outcome, good)
+        if place == AGAIN:
             again(ctx, outcome, implicit)
             return False
-        if found == REACHED:
+        if place == REACHED:
             end_on_surface(ctx, factor, iterations, implicit)
             return True
         surfaces.locating = 0

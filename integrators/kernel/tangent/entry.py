@@ -147,18 +147,18 @@ def differentiate(ctx, trajectory, vectors, earlier, part, pulls):
 
 
 @compiled
-def write_vectors(memory, g, first, vectors, state, made):
+def write_vectors(memory, g, first, vectors, state, written):
     """Write the vectors of a group to sample number ``made``."""
     count, dim, rows, room = memory.count, memory.dim, memory.rows, memory.room
     write(vectors, state, room)
     for v in range(memory.vectors[g]):
         for i in range(dim):
             half, d = i // rows, i % rows
-            memory.out[(made * dim + i) * count + first + v] = room[half * vectors.rows + v * rows + d]
+            memory.out[(written * dim + i) * count + first + v] = room[half * vectors.rows + v * rows + d]
 
 
 @compiled
-def entry(what, address, place):
+def entry(operation, address, place):
     """Do what `Context.follow` promises; return the outcome.
 
     BUDGET: come again with the implicit solver.
@@ -169,19 +169,19 @@ def entry(what, address, place):
     for g in range(memory.groups):
         own, partial = context(memory.own[g]), context(memory.partial[g])
         outcome = DONE
-        if what == STATE:
-            write_vectors(memory, g, first, own, own.state, ctx.made)
-        elif what == STOPPED:
+        if operation == STATE:
+            write_vectors(memory, g, first, own, own.state, ctx.samples_written)
+        elif operation == STOPPED:
             copy(partial.next_state, own.state, vectors_of_state(own))
             copy(partial.next_error, own.error, vectors_of_state(own))
             copy(partial.values, own.values, own.calls * own.padded * own.lanes // 8)
             own.length, own.older_length = partial.h, 0.0
-        elif what == PART_END:
+        elif operation == PART_END:
             copy(own.state, partial.state, vectors_of_state(own))
             copy(own.error, partial.error, vectors_of_state(own))
             outcome = differentiate(ctx, trajectory, partial, own, True, memory.pulls[g])
             if outcome == DONE:
-                write_vectors(memory, g, first, partial, partial.next_state, ctx.made)
+                write_vectors(memory, g, first, partial, partial.next_state, ctx.samples_written)
         else:
             outcome = differentiate(ctx, trajectory, own, own, False, memory.pulls[g])
         if outcome == BUDGET:
@@ -191,7 +191,7 @@ def entry(what, address, place):
             memory.failed = 1
             return outcome
         first += memory.vectors[g]
-    if what == STEP:
+    if operation == STEP:
         for g in range(memory.groups):
             commit(context(memory.own[g]))
     return DONE

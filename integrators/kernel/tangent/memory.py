@@ -15,10 +15,10 @@ class Tangents(Memory):
     rows = Integer()  # components of one of its stages
     count = Integer()  # vectors
     groups = Integer()
-    own = Array("groups", of=int)  # addresses of the groups' contexts,
-    partial = Array("groups", of=int)  # of those for partial steps,
-    pulls = Array("groups", of=int)  # and of the relative derivatives of velocities, by row; 0: none
-    vectors = Array("groups", of=int)  # in each group
+    own = Array("groups", kind=int)  # addresses of the groups' contexts,
+    partial = Array("groups", kind=int)  # of those for partial steps,
+    pulls = Array("groups", kind=int)  # and of the relative derivatives of velocities, by row; 0: none
+    vectors = Array("groups", kind=int)  # in each group
     room = Array("room_size")  # for the state of a group
     room_size = Integer()
     out = Array()  # where samples are written to, as (sample, dim, count)

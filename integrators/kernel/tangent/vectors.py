@@ -67,7 +67,7 @@ class Vectors:
         self.shape, self._parameters = directions.state.shape, directions.parameters
         dim, count = self.shape
         moves = bool(directions.parameters.any())
-        operations = len(reachable(system.function(self._what).roots))
+        operations = len(reachable(system.function(self._function_name).roots))
         most = max(1, min(MOST, OPERATIONS // operations))
         parts = np.array_split(np.arange(count), -(-count // most))
         self._pairs, pulls = [], []
@@ -96,34 +96,34 @@ class Vectors:
         self._context.follow = follow.code().address
 
     @property
-    def _what(self) -> str:
+    def _function_name(self) -> str:
         return "force" if self._context.shape.second else "field"
 
     def _follower(self, system: System, base: Context, chosen: Directions, moves: bool) -> Context:
         """Return the context of a group that follows one of the trajectory's."""
         shape, n = base.shape, chosen.state.shape[1]
         if (n, moves) not in self._fresh:
-            self._fresh[n, moves] = self._made(system, base, n, moves)
-        made = self._fresh[n, moves].copy()
-        made.point_to(base.used_tables)
-        made.solver.tolerance, made.solver.log_rest, made.varying = (
+            self._fresh[n, moves] = self._new_context(system, base, n, moves)
+        context = self._fresh[n, moves].copy()
+        context.point_to(base.used_tables)
+        context.solver.tolerance, context.solver.log_rest, context.varying = (
             base.solver.tolerance,
             base.solver.log_rest,
             base.varying,
         )
-        made.solver.rate = FIRST_RATE
+        context.solver.rate = FIRST_RATE
         parameters = [base.par, *chosen.parameters.T] if moves else [base.par]
-        made.par[:] = np.concatenate(parameters)
+        context.par[:] = np.concatenate(parameters)
         if shape.second:
-            made.factors.velocity[: n * shape.rows] = np.tile(base.factors.velocity[: shape.rows], n)
-        made.write(_laid_out(chosen.state, shape.rows))
-        return made
+            context.factors.velocity[: n * shape.rows] = np.tile(base.factors.velocity[: shape.rows], n)
+        context.write(_laid_out(chosen.state, shape.rows))
+        return context
 
-    def _made(self, system: System, base: Context, n: int, moves: bool) -> Context:
+    def _new_context(self, system: System, base: Context, n: int, moves: bool) -> Context:
         """Return the context of n vectors, without what belongs to one trajectory."""
         shape = base.shape
         c, rows = shape.constants, n * shape.rows
-        field = compile_field(system, system.tangent(self._what, n, parameters=moves), c.lanes)
+        field = compile_field(system, system.tangent(self._function_name, n, parameters=moves), c.lanes)
         halves = 2 if not shape.second and system.dof is not None else 1
         block = np.arange(rows) // (shape.rows // halves)
         wider = Shape(
@@ -242,12 +242,12 @@ class Vectors:
 
     def note_now(self, t: float) -> None:
         """Keep the vectors at the last step, at time t."""
-        found = []
+        columns = []
         for own, _ in self._pairs:
             rows = self._context.shape.rows
             vectors = own.read().reshape(-1, own.shape.rows // rows, rows)
-            found.append(vectors.swapaxes(0, 1).reshape(vectors.shape[1], -1).T)
-        self._known[t] = np.concatenate(found, axis=1)
+            columns.append(vectors.swapaxes(0, 1).reshape(vectors.shape[1], -1).T)
+        self._known[t] = np.concatenate(columns, axis=1)
 
     def take(self, times: Array) -> Array:
         """Return the vectors at samples, shape (m, dim, n); forget them, and those between."""

@@ -167,9 +167,9 @@ class Solve:
         Fixed: ``(tau, end, h, y, par) -> (y, accepted, rejected, whether it came there)``. Adaptive:
         ``rtol`` and ``atol`` in the place of ``h``, after ``par``. Compiled when it is first asked for.
         """
-        made = self.make_plain()
-        self.seconds += made.seconds
-        return made
+        solve = self.make_plain()
+        self.seconds += solve.seconds
+        return solve
 
     def __post_init__(self) -> None:
         self.seconds = self.begin.seconds + self.run.seconds
@@ -228,20 +228,20 @@ def terms(system: System, sign: int, solver: str) -> Any:
     return dx.ODETerm(lambda tau, y, par: sign * f(sign * tau, y, par))
 
 
-_made: dict[tuple[Any, ...], Solve] = {}
+_solves: dict[tuple[Any, ...], Solve] = {}
 
 
-def made(system: System, solver: str, sign: int, adaptive: bool) -> tuple[Solve, bool]:
+def solve_for(system: System, solver: str, sign: int, adaptive: bool) -> tuple[Solve, bool]:
     """Return the compiled solve for a system, and whether this process had it already."""
     split = solver == "SemiImplicitEuler"
     whats = ("velocity_scale", "force") if split else ("field",)
-    emitted = tuple(emit.source(system, what, "jax").sha256 for what in whats)
+    emitted = tuple(emit.source(system, name, "jax").sha256 for name in whats)
     key = (emitted, system.dim, system.n_par, solver, sign, adaptive)
-    if known := _made.get(key):
+    if known := _solves.get(key):
         return known, True
     make = _adaptive if adaptive else _fixed
-    _made[key] = make(terms(system, sign, solver), getattr(dx, solver)(), system.dim, system.n_par, split)
-    return _made[key], False
+    _solves[key] = make(terms(system, sign, solver), getattr(dx, solver)(), system.dim, system.n_par, split)
+    return _solves[key], False
 
 
 def _fixed(terms: Any, solver: Any, dim: int, n_par: int, split: bool) -> Solve:
@@ -276,10 +276,10 @@ def _fixed(terms: Any, solver: Any, dim: int, n_par: int, split: bool) -> Solve:
         return _plainly(terms, solver, tau, end, h, parts(y), par, dx.ConstantStepSize(), whole, None)
 
     tau, y, par, n = np.float64(0.0), np.zeros(dim), np.zeros(n_par), np.int64(0)
-    one = np.float64(1.0)
+    unity = np.float64(1.0)
     first = _compile(begin, tau, y, par)
-    last = _compile(run, tau, one, n, n, y, first.call(tau, y, par), par)
-    return Solve(first, last, lambda: _compile(plain, tau, one, one, y, par))
+    last = _compile(run, tau, unity, n, n, y, first.call(tau, y, par), par)
+    return Solve(first, last, lambda: _compile(plain, tau, unity, unity, y, par))
 
 
 def _plainly(
@@ -352,8 +352,8 @@ def _adaptive(terms: Any, solver: Any, dim: int, n_par: int, split: bool) -> Sol
         control = dx.PIDController(rtol=rtol, atol=atol)
         return _plainly(terms, solver, tau, end, FIRST_STEP, y, par, control, lambda y: y, MOST_STEPS)
 
-    one, y, par = np.float64(1.0), np.zeros(dim), np.zeros(n_par)
-    first = _compile(begin, one, y, par, one, one)
-    state, control, dt = first.call(one, y, par, one, one)
-    last = _compile(run, one, one, dt, y, state, control, np.int64(1), par, one, one)
-    return Solve(first, last, lambda: _compile(plain, one, one, y, par, one, one))
+    unity, y, par = np.float64(1.0), np.zeros(dim), np.zeros(n_par)
+    first = _compile(begin, unity, y, par, unity, unity)
+    state, control, dt = first.call(unity, y, par, unity, unity)
+    last = _compile(run, unity, unity, dt, y, state, control, np.int64(1), par, unity, unity)
+    return Solve(first, last, lambda: _compile(plain, unity, unity, y, par, unity, unity))

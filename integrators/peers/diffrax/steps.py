@@ -29,12 +29,12 @@ class DiffraxProgram(ProgramBase):
         from integrators.peers.diffrax import solve
 
         self.solve, self.adaptive = solve, self.method.h is None
-        made, self.from_cache = self.made(1)
-        self.compile_seconds = 0.0 if self.from_cache else made.seconds
+        compiled, self.from_cache = self.solve_for(1)
+        self.compile_seconds = 0.0 if self.from_cache else compiled.seconds
 
-    def made(self, sign: int) -> tuple[Any, bool]:
+    def solve_for(self, sign: int) -> tuple[Any, bool]:
         """Return the compiled solve for a direction of time, and whether it was there already."""
-        return self.solve.made(self.system, type(self.method).__name__, sign, self.adaptive)
+        return self.solve.solve_for(self.system, type(self.method).__name__, sign, self.adaptive)
 
     def stepper(self, y: Array, par: Array, t: float) -> StepperBase:
         """Return a trajectory."""
@@ -47,7 +47,7 @@ class _Direction:
     def __init__(self, stepper: StepperBase, program: DiffraxProgram, sign: int):
         self.sign = sign
         self._of = stepper, program
-        self.solve, known = program.made(sign)
+        self.solve, known = program.solve_for(sign)
         if not known:
             extra = stepper.stats.extra
             extra["compile_seconds"] = extra.get("compile_seconds", 0.0) + self.solve.seconds
@@ -85,8 +85,8 @@ class DiffraxStepper(FixedStepper):
         way, states = self._way, np.empty((grid.size, self._y.size))
         t, y = self._t, self._y
         for i, end in enumerate(grid.tolist()):
-            found, accepted, _, arrived = way.plain(t, end, np.float64(abs(self._h)), y, self._par)
-            t, y = end, np.asarray(found) if arrived else np.full(y.size, np.nan)
+            state, accepted, _, arrived = way.plain(t, end, np.float64(abs(self._h)), y, self._par)
+            t, y = end, np.asarray(state) if arrived else np.full(y.size, np.nan)
             states[i] = y
             self._stats.steps += int(accepted)
             self._evaluated(int(accepted))
@@ -199,14 +199,14 @@ class AdaptiveStepper(RestorableStepper):
         states, t, y = np.empty((grid.size, self._y.size)), self._t, self._y
         for i, end in enumerate(grid.tolist()):
             self._inner = None
-            found, accepted, rejected, arrived = self._way.plain(t, end, y, self._par, *self._tolerances)
+            state, accepted, rejected, arrived = self._way.plain(t, end, y, self._par, *self._tolerances)
             if not arrived:  # why not is found out under a watch
                 _, y = self._watched(t, y, end, crawl(self, t, end))
                 if self._status.failed:
                     return grid[:i], states[:i]
-                found, accepted, rejected, self._inner = y, 0, 0, None
+                state, accepted, rejected, self._inner = y, 0, 0, None
             self._count(int(accepted), int(rejected))
-            t, y = end, np.asarray(found)
+            t, y = end, np.asarray(state)
             states[i] = y
         return grid, states
 
@@ -245,7 +245,7 @@ class AdaptiveStepper(RestorableStepper):
             states.append(y)
         return np.array(times[1:]), np.array(states).reshape(-1, self._y.size)[1:]
 
-    def _one(self) -> tuple[float, Array] | None:
+    def _one_step(self) -> tuple[float, Array] | None:
         t, y, _ = self._advance(self._t, self._y, math.copysign(math.inf, self._way.sign), 1)
         return None if self._status.failed else (t, y)
 

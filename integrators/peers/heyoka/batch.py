@@ -89,7 +89,7 @@ class Lanes:
                     ended.append((first, ta.propagate_res))
                 y[first : first + size, place] = state.T[: n - first]
         for first, lanes in ended:
-            result.steps[first : first + size] += [one[3] for one in lanes][: n - first]
+            result.steps[first : first + size] += [outcome[3] for outcome in lanes][: n - first]
         broken = np.logical_not(np.isfinite(y).all(axis=2))
         for i in np.flatnonzero(broken.any(axis=1)).tolist():
             if result.status[i] is Status.FINISHED:  # so in the very step that came to the time

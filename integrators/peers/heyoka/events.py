@@ -42,11 +42,11 @@ def heyoka_events(problem: Problem, events: Mapping[str, Event]) -> list[Any]:
     problems.errors.InputError
         For a function that cannot be traced.
     """
-    hy, made = load("heyoka"), []
+    hy, result = load("heyoka"), []
     for i, (name, event) in enumerate(events.items()):
         traced = problem.system.trace(event.g, f"event {name!r}")
-        made.append(hy.nt_event(emit.heyoka_of(problem.system, traced), Recorder(i)))
-    return made
+        result.append(hy.nt_event(emit.heyoka_of(problem.system, traced), Recorder(i)))
+    return result
 
 
 class TaylorSearch:

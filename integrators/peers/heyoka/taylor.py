@@ -318,7 +318,7 @@ class TaylorStepper(RestorableStepper):
             states.append(self._ta.state.copy())
         return np.array(times[1:]), np.array(states)[1:]
 
-    def _one(self) -> tuple[float, Array] | None:
+    def _one_step(self) -> tuple[float, Array] | None:
         if self._ta.time == self._t and self._step() is None:
             return None
         return self._ta.time, self._ta.state

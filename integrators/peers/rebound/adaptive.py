@@ -107,7 +107,7 @@ class AdaptiveStepper(StepperBase):
                     states.append(self._program.state(self._layout, simulation))
         return np.array(times[1:]), np.array(states)[1:]
 
-    def _one(self) -> tuple[float, Array] | None:
+    def _one_step(self) -> tuple[float, Array] | None:
         simulation = self._simulation
         self._towards(math.copysign(math.inf, simulation.dt))
         with calls(self._stats):

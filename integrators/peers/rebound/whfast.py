@@ -60,10 +60,10 @@ WHFAST = """\
 class _Permutation:
     def checked(self, owner: str, name: str, value: Any) -> tuple[int, ...]:
         places = [whole(i) for i in value] if isinstance(value, Sequence | np.ndarray) else []
-        found = tuple(i for i in places if i is not None)
-        if not found or sorted(found) != list(range(len(places))):
+        order = tuple(i for i in places if i is not None)
+        if not order or sorted(order) != list(range(len(places))):
             raise refusal(owner, name, value, "a list that names each body from 0 once, as in (2, 0, 1)")
-        return found
+        return order
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -97,11 +97,11 @@ class CentralMethod(FixedMethod):
 
     def radial(self, layout: Layout, y0: Array) -> list[str]:
         """Return what is wrong with a Jacobi orbit that is radial."""
-        found = _radial(layout, y0)
+        bodies = _radial(layout, y0)
         return [
             f"the Jacobi orbit of body {i} is radial: it goes through the barycentre of those "
             "before it, where the Kepler orbit is singular"
-            for i in found[:1]
+            for i in bodies[:1]
         ]
 
 
@@ -195,10 +195,10 @@ class WHFast(CentralMethod):
 def _radial(layout: Layout, y: Array) -> list[int]:
     """Return the bodies, in the problem's order, whose Jacobi orbits are radial."""
     x, v = layout.vectors(y)
-    m, found = layout.masses, []
+    m, bodies = layout.masses, []
     for i in range(1, layout.n):
         share = m[:i, None] / np.sum(m[:i])
         r, u = x[i] - np.sum(share * x[:i], axis=0), v[i] - np.sum(share * v[:i], axis=0)
         if np.linalg.norm(np.cross(r, u)) <= RADIAL * np.linalg.norm(r) * np.linalg.norm(u):
-            found.append(int(np.flatnonzero(layout.place == i)[0]))
-    return found
+            bodies.append(int(np.flatnonzero(layout.place == i)[0]))
+    return bodies

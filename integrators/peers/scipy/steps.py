@@ -109,15 +109,15 @@ class SciPyStepper(StepperBase):
     def _jacobian(self, t: float, y: Array) -> Any:
         from scipy.sparse import csc_matrix
 
-        found = self._program.jacobian
-        assert found is not None
-        values = np.empty(found.rows.size)
+        jacobian = self._program.jacobian
+        assert jacobian is not None
+        values = np.empty(jacobian.rows.size)
         self._program.entries(t, y, self._par, values)
-        shape = (found.size, found.size)
-        if self._sparse and found.size > DENSE and found.density < SPARSE:
-            return csc_matrix((values, (found.rows, found.columns)), shape=shape)
+        shape = (jacobian.size, jacobian.size)
+        if self._sparse and jacobian.size > DENSE and jacobian.density < SPARSE:
+            return csc_matrix((values, (jacobian.rows, jacobian.columns)), shape=shape)
         matrix = np.zeros(shape)
-        matrix[found.rows, found.columns] = values
+        matrix[jacobian.rows, jacobian.columns] = values
         return matrix
 
     def _make(
@@ -179,7 +179,7 @@ class SciPyStepper(StepperBase):
             states.append(self._solver.y)
         return np.array(times[1:]), np.array(states)[1:]
 
-    def _one(self) -> tuple[float, Array] | None:
+    def _one_step(self) -> tuple[float, Array] | None:
         self._bound(self._solver.direction * math.inf)
         if self._solver.t == self._t and not self._step(Crawl(self._t, self._t)):
             return None

@@ -71,8 +71,8 @@ class JaxProgram:
                 f"{method} has no form on JAX that conserves the energy of a Poisson system such as "
                 f"{system.name}; use Gauss(s, h), or leave backend= out."
             )
-        made: Any = plugin.Gauss if gauss else plugin.HBVM
-        self._solver = made(**{name: options[name] for name in ("k", "s") if name in options})
+        kind: Any = plugin.Gauss if gauss else plugin.HBVM
+        self._solver = kind(**{name: options[name] for name in ("k", "s") if name in options})
         self._term = dx.ODETerm(emit.jax(system, "field"))
         self.system, self.h, self.compile_seconds = system, float(h), 0.0
         self.piece = SIDE_BY_SIDE.get(jax.default_backend(), SIDE_BY_SIDE["gpu"])
@@ -104,9 +104,9 @@ class JaxProgram:
             run = self._compiled(h, starts[:1], parameters[:1], targets, parts, t0)
             for first in range(0, n, self.piece):
                 here = np.minimum(np.arange(first, first + self.piece), n - 1)  # the last one fills the piece
-                made, steps = run(starts[here], parameters[here], targets, parts, t0)
+                states, steps = run(starts[here], parameters[here], targets, parts, t0)
                 rest = min(self.piece, n - first)
-                y[first : first + rest], taken[first : first + rest] = made[:rest], steps[:rest]
+                y[first : first + rest], taken[first : first + rest] = states[:rest], steps[:rest]
         arrived: Any = np.isfinite(y[:, -1]).all(axis=1)
         stop = np.where(arrived, grid[-1], t0 + taken * h)
         reasons = [
@@ -123,13 +123,15 @@ class JaxProgram:
             began = perf_counter()
             starts, parameters = (np.repeat(rows, self.piece, axis=0) for rows in (start, par))
             function = jax.jit(
-                jax.vmap(lambda *given: self._one(h, *given), in_axes=(0, 0, None, None, None))
+                jax.vmap(lambda *given: self._trajectory(h, *given), in_axes=(0, 0, None, None, None))
             )
             self._made[key] = function.lower(starts, parameters, *plans).compile()
             self.compile_seconds += perf_counter() - began
         return self._made[key]
 
-    def _one(self, h: float, start: Any, par: Any, targets: Any, parts: Any, t0: Any) -> tuple[Any, Any]:
+    def _trajectory(
+        self, h: float, start: Any, par: Any, targets: Any, parts: Any, t0: Any
+    ) -> tuple[Any, Any]:
         """Return the states of one trajectory at all samples, and the steps that were solved."""
         solver, term = self._solver, self._term
 

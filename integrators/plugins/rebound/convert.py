@@ -75,8 +75,8 @@ def from_rebound(simulation: Any, *, t_end: float, forces: Sequence[Any] = ()) -
         )
     return nbody(
         masses[:n],
-        [[one.x, one.y, one.z] for one in particles],
-        [[one.vx, one.vy, one.vz] for one in particles],
+        [[body.x, body.y, body.z] for body in particles],
+        [[body.vx, body.vy, body.vz] for body in particles],
         massless=len(particles) - n, forces=forces, G=simulation.G,
         softening=simulation.softening or None, t0=simulation.t, t_end=t_end,
     )  # fmt: skip
@@ -137,7 +137,7 @@ def to_rebound(
         raise InputError(f"the simulation has {simulation.N} bodies, and {problem!s} {n}.")
     simulation.t = time
     for i in range(n):
-        one = simulation.particles[i]
-        one.x, one.y, one.z = x[i].tolist()
-        one.vx, one.vy, one.vz = v[i].tolist()
+        particle = simulation.particles[i]
+        particle.x, particle.y, particle.z = x[i].tolist()
+        particle.vx, particle.vy, particle.vz = v[i].tolist()
     return simulation

@@ -187,10 +187,10 @@ class HBVM(OdeSolver):
 
     def _step_impl(self) -> tuple[bool, str | None]:
         assert self._steps is not None
-        made = self._steps.take(self.t, self.y)
-        if isinstance(made, str):
-            return False, made
-        self.t, self.y = made
+        step = self._steps.take(self.t, self.y)
+        if isinstance(step, str):
+            return False, step
+        self.t, self.y = step
         return True, None
 
     def _dense_output_impl(self) -> DenseOutput:

@@ -49,7 +49,7 @@ class Field:
         return out
 
 
-def field(what: Problem | System, parameters: Mapping[str, Value] = MappingProxyType({})) -> Field:
+def field(source: Problem | System, parameters: Mapping[str, Value] = MappingProxyType({})) -> Field:
     """Return the field of a problem or system as a function for `scipy.integrate.solve_ivp`.
 
         problem = problems.load("kepler", e=0.6)
@@ -57,7 +57,7 @@ def field(what: Problem | System, parameters: Mapping[str, Value] = MappingProxy
 
     Parameters
     ----------
-    what : Problem or System
+    source : Problem or System
         A problem brings the values of its parameters with it.
     parameters : mapping of str to float or sequence of float
         Values for a system's that differ from its own.
@@ -67,15 +67,15 @@ def field(what: Problem | System, parameters: Mapping[str, Value] = MappingProxy
     problems.errors.InputError
         For something else than a problem or a system, or parameters that it does not have.
     """
-    if isinstance(what, Problem):
+    if isinstance(source, Problem):
         if parameters:
             raise InputError("a problem has the values of its parameters; load it with those you want.")
-        return Field(what.system, what.par)
-    if not isinstance(what, System):
+        return Field(source.system, source.par)
+    if not isinstance(source, System):
         raise InputError(
-            f"field() takes a Problem or a System, not {what!r}; give a numba function to solve_ivp as it is."
+            f"field() takes a Problem or a System, not {source!r}; give solve_ivp a numba function as it is."
         )
-    return Field(what, what.pack(parameters))
+    return Field(source, source.pack(parameters))
 
 
 def recognised(fun: Any, dim: int, *, vectorized: bool) -> Field | None:

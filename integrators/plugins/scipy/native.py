@@ -97,16 +97,16 @@ class NativeSteps:
         """Go on from (t, y), which is where the last call ended; return time and state, or why not."""
         if self._stepper.status.failed:
             return str(self._stepper.reason)
-        made = self._own()
-        if not (made.t.size or made.status.failed):
-            made = self._stepper.advance(np.array([self._t_bound]), sample="partial")
-        if not made.t.size:
-            return made.reason
-        self._before, self._made = (t, y), made
-        end = float(made.t[-1])
+        samples = self._own()
+        if not (samples.t.size or samples.status.failed):
+            samples = self._stepper.advance(np.array([self._t_bound]), sample="partial")
+        if not samples.t.size:
+            return samples.reason
+        self._before, self._made = (t, y), samples
+        end = float(samples.t[-1])
         if abs(end - self._t_bound) <= SNAP * np.spacing(abs(self._t_bound)):
-            end = made.t[-1] = self._t_bound
-        return end, made.y[-1].copy()
+            end = samples.t[-1] = self._t_bound
+        return end, samples.y[-1].copy()
 
     def _own(self) -> Samples:
         """Take steps, none beyond the bound."""
@@ -174,10 +174,10 @@ class Between:
                 self._earlier = self.evaluations
                 self._stepper = self._program.start(y, self._par, t0)
             if isinstance(self._stepper, FixedStepper):
-                made = self._stepper.single(y, t0, t)
+                samples = self._stepper.single(y, t0, t)
             else:
-                made = self._stepper.advance(np.array([t]), sample="stop")
-            return made.y[0] if made.t.size else np.full(y.size, np.nan)
+                samples = self._stepper.advance(np.array([t]), sample="stop")
+            return samples.y[0] if samples.t.size else np.full(y.size, np.nan)
 
 
 class NativeOutput(DenseOutput):
@@ -200,8 +200,8 @@ class NativeOutput(DenseOutput):
         times = np.atleast_1d(t).astype(float)
         places = np.searchsorted(self._sign * self._times, self._sign * times, side="right") - 1
         places = np.clip(places, 0, self._times.size - 1)
-        found = [self._at(i, time) for i, time in zip(places.tolist(), times.tolist(), strict=True)]
-        states = np.array(found).reshape(times.size, -1).T
+        states_ = [self._at(i, time) for i, time in zip(places.tolist(), times.tolist(), strict=True)]
+        states = np.array(states_).reshape(times.size, -1).T
         return states[:, 0] if t.ndim == 0 else states
 
     def _at(self, i: int, t: float) -> Array:

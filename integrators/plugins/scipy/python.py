@@ -96,8 +96,8 @@ class PythonSteps:
         """Take a step from (t, y), which is where the last one ended; return time and state, or why not."""
         if self._output is None and self._solver.vectorized:
             self._stages.try_together(t, self._first(t, y), y, self._slope(t, y))
-        made = self._varying(t, y) if self._constant is None else self._of_constant_length(t, y)
-        return made if isinstance(made, str) else (made[0], self._add(t, *made, y))
+        step = self._varying(t, y) if self._constant is None else self._of_constant_length(t, y)
+        return step if isinstance(step, str) else (step[0], self._add(t, *step, y))
 
     def _varying(self, t: float, y: Array) -> tuple[float, Solved] | str:
         """Solve for a step that the tolerances allow; return its end and solution, or why there is none."""

@@ -12,7 +12,7 @@ class Inner(Part):
     rate = Real()
     count = Integer()
     sizes = Array("count")
-    rows = Array(2, "rows", of=int)  # of the memory: the part has no such number
+    rows = Array(2, "rows", kind=int)  # of the memory: the part has no such number
 
 
 class Outer(Memory):
