@@ -7,7 +7,7 @@ from hbvm_bench.measure.measured import POSITION
 from hbvm_bench.measure.metrics import GUARD_TOLERANCE
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries.outcomes import disturbed
-from hbvm_bench.summaries.points import accurate, number, short_name
+from hbvm_bench.summaries.points import accurate, is_hbvm_or_gauss, number, short_name
 from hbvm_bench.summaries.rows import (
     APART,
     GROUPS,
@@ -158,7 +158,7 @@ def shortcomings(records: Sequence[Record]) -> list[str]:
     shown = [*WEAKNESSES, *([ANGULAR_MOMENTUM] if turning else [])]
     for record in records:
         position, energy = number(record, "position_end"), number(record, "energy_max")
-        ours = record.role == "ours" and reached(record)
+        ours = is_hbvm_or_gauss(record) and reached(record)
         if not ours or position is None or energy is None or position < 1e-2:
             continue
         z, angular = number(record, "z_error"), number(record, "angular_momentum_max")

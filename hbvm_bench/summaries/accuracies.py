@@ -7,7 +7,7 @@ from hbvm_bench.measure.timing import Spread
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries import standings
 from hbvm_bench.summaries.goals import ratio_text
-from hbvm_bench.summaries.points import by_family
+from hbvm_bench.summaries.points import by_family, is_hbvm_or_gauss
 from hbvm_bench.summaries.rows import seconds
 from hbvm_bench.summaries.table import NONE, Table
 
@@ -21,7 +21,8 @@ def table(campaign: Campaign, records: Sequence[Record]) -> Table | None:
     ``None`` where no setting was timed that is accurate to any level.
     """
     titled = [(standings.title_of(entry), here) for entry, here in standings.entries(campaign, records)]
-    peers = list(by_family([record for _, here in titled for record in here if record.role != "ours"]))
+    others = [record for _, here in titled for record in here if not is_hbvm_or_gauss(record)]
+    peers = list(by_family(others))
     rows = [
         (title, f"{level:g}", *_cells(here, level, peers))
         for title, here in titled

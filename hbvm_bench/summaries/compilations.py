@@ -7,7 +7,7 @@ from hbvm_bench.campaign.file import Campaign
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries import standings
 from hbvm_bench.summaries.outcomes import by_compilation
-from hbvm_bench.summaries.points import by_family
+from hbvm_bench.summaries.points import by_family, is_hbvm_or_gauss
 from hbvm_bench.summaries.rows import seconds
 from hbvm_bench.summaries.table import NONE, Table
 
@@ -22,7 +22,7 @@ def table(campaign: Campaign, records: Sequence[Record]) -> Table | None:
     rows = []
     for entry, here in standings.entries(campaign, records):
         libraries = {OURS: standings.among(here, "")} | by_family(
-            [setting for setting in here if setting.role != "ours"]
+            [setting for setting in here if not is_hbvm_or_gauss(setting)]
         )
         fastest = {name: standings.best(those, entry.within) for name, those in libraries.items()}
         times = {name: by_compilation(setting) for name, setting in fastest.items() if setting is not None}

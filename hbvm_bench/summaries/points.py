@@ -20,9 +20,24 @@ def short_name(problem: str) -> str:
     return re.sub(r"^[^:()]*\.py(@\w+)?:", "", problem)
 
 
+PROJECTION = "HBVM(projection='energy')"
+"""The family of HBVM with its energy projected: no energy-conserving method, so none of HBVM's settings."""
+
+
 def family_of(record: Record) -> str:
-    """Return the family of a case: the name of its method."""
-    return parse_spec(record.case.method).name
+    """Return the family of a case: the name of its method, or `PROJECTION`."""
+    return family_named(record.case.method)
+
+
+def family_named(method: str) -> str:
+    """Return the family of a method, as it prints."""
+    spec = parse_spec(method)
+    return PROJECTION if spec.name == "HBVM" and spec.arguments.get("projection") else spec.name
+
+
+def is_hbvm_or_gauss(record: Record) -> bool:
+    """Whether a case counts for HBVM and Gauss: it is one of this project's, and no projection."""
+    return record.role == "ours" and family_of(record) != PROJECTION
 
 
 def by_problem(records: Sequence[Record]) -> dict[str, list[Record]]:

@@ -14,7 +14,7 @@ from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.campaign.sweep import combinations, fill
 from hbvm_bench.measure.timing import Spread, chooses
 from hbvm_bench.store.records import Record
-from hbvm_bench.summaries.points import accurate, family_of, number
+from hbvm_bench.summaries.points import accurate, family_of, is_hbvm_or_gauss, number
 from hbvm_bench.summaries.rows import Task, tasks
 
 TIME = "warm_seconds"
@@ -51,9 +51,9 @@ def title_of(entry: ProblemEntry) -> str:
 
 
 def among(records: Sequence[Record], who: str) -> list[Record]:
-    """Return the records of a family or of one setting; of HBVM and Gauss for ``""``."""
+    """Return the records of a family or of one setting; for ``""`` of HBVM and Gauss, without projections."""
     if not who:
-        return [record for record in records if record.role == "ours"]
+        return [record for record in records if is_hbvm_or_gauss(record)]
     return [record for record in records if who in (family_of(record), record.case.method)]
 
 

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from hbvm_bench.campaign.file import Case
 from hbvm_bench.campaign.identity import fixed_step, is_ours, make_method
-from hbvm_bench.campaign.spec import parse_spec
+from hbvm_bench.summaries.points import PROJECTION, family_named
 
 OURS = ""
 FIXED, OWN = "fixed step size", "adaptive step size"
@@ -26,6 +26,9 @@ FAMILIES: dict[str, Family] = {
         "HBVM and Gauss",
         "HBVM, Gauss",
         "compiled here by numba for this processor, vector instructions as it has them",
+    ),
+    PROJECTION: Family(
+        "HBVM with its energy projected", "HBVM, projection", "compiled here by numba, as HBVM and Gauss"
     ),
     "Taylor": Family("heyoka, Taylor", "heyoka", "compiled here by heyoka's LLVM for this processor"),
     "IAS15": Family("REBOUND, IAS15", "IAS15", WHEEL_AND_FORCES),
@@ -60,5 +63,6 @@ class Row(NamedTuple):
 def row_of(case: Case) -> Row:
     """Return the row that a setting belongs to."""
     method = make_method(case.method)
-    family = OURS if is_ours(method) else parse_spec(case.method).name
+    family = family_named(case.method)
+    family = OURS if is_ours(method) and family != PROJECTION else family
     return Row(family, FIXED if fixed_step(method) else OWN)

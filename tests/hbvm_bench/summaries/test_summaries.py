@@ -4,8 +4,9 @@ import pytest
 from msgspec.structs import replace
 
 from hbvm_bench.campaign.file import Ensemble, Grid
+from hbvm_bench.report.figures.style import looks
 from hbvm_bench.store.records import Compile, Law, Load, Timing, TimingRound, Value
-from hbvm_bench.summaries import laws, needs, outcomes, points, rows
+from hbvm_bench.summaries import laws, needs, outcomes, points, rows, standings
 from tests.hbvm_bench import made_up_run
 
 
@@ -205,3 +206,13 @@ def test_times_of_a_busy_machine_are_doubtful():
     assert "Nothing was timed" in outcomes.doubts([record("Taylor()")])[0]
     slow = record("Radau(rtol=1, atol=1)", outcome="timeout", status="", metrics={})
     assert "time limit ended 1 cases (Radau 1)" in " ".join(outcomes.doubts([slow]))
+
+
+def test_a_projection_onto_the_energy_is_a_family_of_its_own():
+    """It is none of HBVM's settings: not in a comparison of HBVM and Gauss, and not in HBVM's column."""
+    projected = made_up_run.record("HBVM(tol=1e-06, projection='energy')")
+    ours = made_up_run.record("HBVM(tol=1e-06)")
+    assert [points.family_of(each) for each in (ours, projected)] == ["HBVM", points.PROJECTION]
+    assert standings.among([projected, ours], "") == standings.among([projected, ours], "HBVM") == [ours]
+    assert standings.among([projected, ours], points.PROJECTION) == [projected]
+    assert looks([points.PROJECTION])[points.PROJECTION].light == looks(["HBVM"])["HBVM"].light

@@ -3,13 +3,14 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from hbvm_bench.campaign.file import name_of
+from hbvm_bench.campaign.file import Case, name_of
 from hbvm_bench.campaign.identity import fixed_step, make_method, make_problem, resolve
 from hbvm_bench.campaign.shorter import QUICK_SHARE, chosen, quick_run
 from hbvm_bench.reference import solutions
 from hbvm_bench.studies.race.families import FAMILIES, FIXED, OURS, OWN, row_of
 from hbvm_bench.studies.race.probe import METHODS
 from hbvm_bench.studies.race.results import declared
+from hbvm_bench.summaries.points import PROJECTION
 from problems.errors import UnknownNameError
 
 KEYS = [name_of(entry) for entry in declared().entries()]
@@ -40,6 +41,12 @@ def test_the_quick_settings_are_some_of_the_declared_ones(key):
     counts = Counter(row_of(case).family for case in quick)
     assert set(counts.values()) == {QUICK_SETTINGS}
     assert {case.method for case in quick} <= {case.method for case in cases(key)}
+
+
+def test_a_projection_is_in_no_row_of_hbvm():
+    case = Case(problem="kepler()", method="HBVM(tol=1e-06, projection='energy')")
+    assert row_of(case).family == PROJECTION in FAMILIES
+    assert row_of(Case(problem="kepler()", method="HBVM(tol=1e-06)")).family == OURS
 
 
 @pytest.mark.parametrize("key", KEYS)
