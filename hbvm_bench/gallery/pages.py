@@ -63,7 +63,7 @@ def _filled(path: Path, pieces: Sequence[str]) -> str:
 
 
 def _engines(names: Sequence[str]) -> str:
-    table, reasons = findings.engines(names)
+    table, reasons = findings.engines(names, any_processor=True)
     listed = "\n".join(f"{i}. {reason}" for i, reason in enumerate(reasons, start=1))
     return f"{printed(table)}\n\n{listed}"
 

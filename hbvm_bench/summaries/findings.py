@@ -13,6 +13,7 @@ from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.summaries.table import Table
 from integrators.methods.automatic import exact_k
+from integrators.peers.rebound.whfast512 import NO_AVX512
 from integrators.protocol import MethodBase
 from problems import emit
 from problems.analysis import structure
@@ -213,9 +214,17 @@ def matrix(names: Sequence[str] = ()) -> dict[str, dict[str, str | None]]:
     return {name: reasons(problems.load(name)) for name in (names or problems.names())}
 
 
-def engines(names: Sequence[str] = ()) -> tuple[Table, list[str]]:
-    """Return the matrix as a table, ✓ or the number of a reason, with the reasons in that order."""
+def engines(names: Sequence[str] = (), *, any_processor: bool = False) -> tuple[Table, list[str]]:
+    """Return the matrix as a table, ✓ or the number of a reason, with the reasons in that order.
+
+    With ``any_processor`` a lack of this processor is no reason, so that the table is the same everywhere.
+    """
     rows = matrix(names)
+    if any_processor:
+        rows = {
+            name: {engine: None if why == NO_AVX512 else why for engine, why in row.items()}
+            for name, row in rows.items()
+        }
     listed = list(dict.fromkeys(reason for row in rows.values() for reason in row.values() if reason))
     signs = {None: "✓"} | {reason: str(number) for number, reason in enumerate(listed, 1)}
     cells = [(name, *(signs[reason] for reason in row.values())) for name, row in rows.items()]

@@ -17,6 +17,7 @@ from integrators.protocol import Array
 from problems.problem import Problem, System
 
 MOST_BODIES = 9
+NO_AVX512 = "this processor has no AVX-512."
 ROOM = 64
 """Bytes for the processor's modes; C's ``fenv_t`` has 32 on x86-64."""
 
@@ -62,7 +63,7 @@ class WHFast512(FixedMethod):
         if not 2 <= n <= MOST_BODIES:
             return f"it takes 2 to {MOST_BODIES} bodies, the problem has {n}."
         if not load("rebound").avx512_available:
-            return "this processor has no AVX-512."
+            return NO_AVX512
         return super().refuses(system, par)
 
     def caveat(self, problem: Problem) -> str | None:

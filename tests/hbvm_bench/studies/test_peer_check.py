@@ -65,7 +65,10 @@ def test_the_bench_takes_the_library_s_steps_to_its_end(problem, method):
     whole = make_problem(problem)
     if not problem.startswith(SHORT):
         spec = parse_spec(problem)
-        whole = make_problem(str(Spec(spec.name, spec.arguments | {"t_end": SHARE * whole.t_end})))
+        t_end = SHARE * whole.t_end
+        if method.startswith("WHFast512"):  # which ends with a whole step only
+            t_end = np.floor(t_end / (h := make_method(method).h)) * h
+        whole = make_problem(str(Spec(spec.name, spec.arguments | {"t_end": float(t_end)})))
     ends, steps = [], []
     for text in (method, ALONE + method):
         made = make_method(text)
