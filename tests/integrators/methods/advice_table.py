@@ -1,7 +1,7 @@
 """What `integrators.advise` expects on the forty systems of `forty`, beside the true errors.
 
-``python -m tests.integrators.methods.advice_table`` prints the table of docs/howto/which_method.md. Which of the
-proposals is the fastest depends on the machine, and with it the setting and both errors.
+``python -m tests.integrators.methods.advice_table`` prints the table of docs/howto/which_method.md. Which
+of the proposals is the fastest depends on the machine, and with it the setting and both errors.
 """
 
 from dataclasses import dataclass
