@@ -102,8 +102,13 @@ def is_after(date: str, other: str) -> bool:
 
 def disturbed(goal: Goal, records: Sequence[Record | None]) -> str:
     """Return why a speed is not judged: other work while its times were taken; else ``""``."""
+    return other_work(records) if goal.metric in TIMES else ""
+
+
+def other_work(records: Sequence[Record | None]) -> str:
+    """Return why the times of cases are not judged: the share of a core of other work; else ``""``."""
     timings = [item.timing for item in records if item is not None and item.timing is not None]
-    if goal.metric not in TIMES or not timings:
+    if not timings:
         return ""
     loads = [item.load for item in timings if item.load is not None]
     shares = [1.0 - median(round_.share for round_ in item.rounds) for item in timings if item.rounds]

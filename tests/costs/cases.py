@@ -6,10 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 import problems
 from hbvm_bench.campaign.shipped.general import brusselator, decay_chain, diffusion, hires, lorenz
+from hbvm_bench.studies.costs.lattice import lattice
 from integrators import HBVM, Gauss, integrate
 from integrators.protocol import Status
 from problems import Problem
@@ -68,23 +67,6 @@ CASES = {
     "lorenz": Case(lorenz, (HBVM(), HBVM(tol=1e-6))),
     "brusselator": Case(brusselator, (HBVM(), HBVM(tol=1e-6))),
 }
-
-
-def lattice(n: int, t_end: float = 10.0) -> Problem:
-    """Return the discrete nonlinear Schroedinger equation on a ring of n places, from a rough start."""
-
-    def energy(q, p, m):
-        hops = m.sum(lambda i: q[i] * q[i + 1] + p[i] * p[i + 1], range(n - 1))
-        squares = m.sum(lambda i: (q[i] ** 2 + p[i] ** 2) ** 2, range(n))
-        return hops + q[n - 1] * q[0] + p[n - 1] * p[0] - squares / 4
-
-    system = problems.Hamiltonian(energy, dof=n, name=f"lattice_{n}")
-    return Problem(
-        system,
-        y0=0.5 * np.random.default_rng(1).standard_normal(2 * n),
-        t_end=t_end,
-        title=f"lattice of {n} places",
-    )
 
 
 def counted(name: str) -> dict[str, dict[str, int]]:

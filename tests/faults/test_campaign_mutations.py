@@ -18,7 +18,7 @@ FREE = {"values", "sweep"}
 """Tables whose keys are the file's own names."""
 
 QUICK = ("smoke", "endure", "automatic", "ensemble", "outer-solar-system", "sitnikov", "work-precision")
-SLOW = ("general", "drift", "race", "peers", "paper", "chaos", "encounters", "random", "large")
+SLOW = ("general", "drift", "race", "peers", "paper", "chaos", "encounters", "random", "large", "costs")
 
 
 def leaves(data, path=()):

@@ -1,0 +1,298 @@
+"""The page on costs, from kept results alone."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from statistics import median
+
+from hbvm_bench.campaign.spec import Spec
+from hbvm_bench.measure.measured import POSITION
+from hbvm_bench.measure.timing import Spread
+from hbvm_bench.report import provenance
+from hbvm_bench.report.document import Items, Maker, Note, Section, attempt
+from hbvm_bench.report.page import Results as Run
+from hbvm_bench.report.page import block
+from hbvm_bench.store.records import Record
+from hbvm_bench.store.store import Store
+from hbvm_bench.studies.computations import Part, Results, Task, load, run_all, sections_of, telling
+from hbvm_bench.studies.costs import experiments
+from hbvm_bench.studies.costs.experiments import CALLED, FIRST, ON_LATTICES, STEPPED, Iterations, Times
+from hbvm_bench.summaries import compilations, outcomes, standings
+from hbvm_bench.summaries.goals import OTHER_WORK, other_work, ratio_text
+from hbvm_bench.summaries.points import family_of
+from hbvm_bench.summaries.rows import format_metric, grouped_by, status_of
+from hbvm_bench.summaries.table import NONE, Table
+from integrators.methods.hbvm import HBVM
+
+NAME = "costs"
+DEFAULT = "HBVM()"
+METRICS = ("warm_seconds", "steps", "evaluations", "energy_max", "position_end")
+SIZES, QUICK_SIZES = (10, 100, 1000, 4000), (10, 100)
+ROUNDS, QUICK_ROUNDS = 40, 3
+FRESH, QUICK_FRESH = 3, 1
+LATTICE_END, QUICK_END = 10.0, 2.0
+
+
+@dataclass(frozen=True)
+class Ratio:
+    """A setting's time relative to that of `DEFAULT` on one problem, and whether it is judged.
+
+    Attributes
+    ----------
+    record, default : Record
+        Both cases.
+    spread : Spread or None
+        Of the ratio within each round; ``None`` where one of them was not timed.
+    """
+
+    record: Record
+    default: Record
+    spread: Spread | None
+
+    @classmethod
+    def from_records(cls, record: Record, default: Record) -> "Ratio":
+        """Compare a case with that of the default on the same problem."""
+        return cls(record, default, standings.compare(default, record).ratio)
+
+    @property
+    def busy(self) -> str:
+        """Why it is not judged; empty otherwise."""
+        return other_work([self.record, self.default])
+
+    @property
+    def verdict(self) -> str:
+        """Whether the setting takes less time than the default, by the quartiles of the ratio."""
+        spread = self.spread
+        if spread is None:
+            return next((status_of(case) for case in (self.record, self.default) if not case.timing), NONE)
+        if self.busy:
+            return f"not judged: {self.busy}"
+        if spread.low is None or spread.high is None:
+            return NONE
+        return "less time" if spread.high < 1.0 else "more time" if spread.low > 1.0 else "no difference"
+
+
+def parts(*, quick: bool) -> list[Part]:
+    """Return what is computed and shown beside the cases, in a quick run or a whole one."""
+    sizes, t_end = (QUICK_SIZES, QUICK_END) if quick else (SIZES, LATTICE_END)
+    rounds, fresh = (QUICK_ROUNDS, QUICK_FRESH) if quick else (ROUNDS, FRESH)
+    lattices = [Task(f"of {n}", partial(experiments.iterations, n, t_end), cost=n / 100) for n in sizes]
+
+    def on_lattices(results: Results) -> list[Maker]:
+        return [("the iterations", lambda: iterations({n: results[f"of {n}"] for n in sizes}, t_end))]
+
+    def measured(
+        key: str, title: str, run: Callable[[int], Times], rounds: int, make: Callable[[Times], Table]
+    ) -> Part:
+        task = Task("times", partial(run, rounds), timed=True)
+        return Part(key, title, [task], _none, lambda results: [(title, lambda: make(results["times"]))])
+
+    return [
+        Part("lattices", "Iterations on a lattice", lattices, _none, on_lattices),
+        measured("calls", "A second call of integrate", experiments.calls, rounds, calls),
+        measured("steps", "run.step() beyond the kernel's step", experiments.steps, rounds, steps),
+        measured("first", "The first result of a fresh process", experiments.first_results, fresh, fresh_),
+    ]
+
+
+def compute(store: Store, jobs: int, tell: Callable[[str], None]) -> None:
+    """Compute what is missing beside the cases of a run."""
+    quick = store.index().campaign.quick
+    tasks = [task for part in parts(quick=quick) for task in part.tasks]
+    run_all(NAME, tasks, jobs, store, telling(tell, len(tasks)), variant="quick" * quick)
+
+
+COMPUTATIONS = {"compute": compute}
+
+
+@block
+def tolerances(run: Run) -> list[Section]:
+    """Return the times at looser tolerances, of HBVM and of its projection apart, with the errors."""
+    members = ratios(run)
+    blocks = attempt(
+        ("times by tolerance", partial(summary, members)),
+        ("errors and times", partial(details, members)),
+    )
+    note = Note(
+        f"{POSITION} Here: at the end. Ratios: the median of the ratio of CPU times within each interleaved "
+        "round, all settings of a problem in one process."
+    )
+    return [Section("Looser tolerances", [note, *blocks], "tolerances", nav="Tolerances")]
+
+
+@block
+def beside(run: Run) -> list[Section]:
+    """Return what was computed beside the cases."""
+    kept = load(NAME, run.beside)
+    quick = run.runs[-1].index.campaign.quick
+    return sections_of([(part, Results(part, kept)) for part in parts(quick=quick)])
+
+
+@block
+def conditions(run: Run) -> Section:
+    """Return the processor, the other work while times were taken, and the compilations."""
+    records = run.records
+    said = [*provenance.processors(records), *outcomes.compilations(records), *outcomes.beside(records)]
+    tables = [compilations.table(member.index.campaign, member.records) for member in run.runs]
+    return Section(
+        "How it was measured", [Items(said), *(table for table in tables if table is not None)], "conditions"
+    )
+
+
+def ratios(run: Run) -> dict[str, list[Ratio]]:
+    """Return the settings of each problem beside `DEFAULT`, which comes first, by the problem's title."""
+    campaign = run.runs[-1].index.campaign
+    members: dict[str, list[Ratio]] = {}
+    for entry, records in standings.entries(campaign, run.records):
+        default = next(iter(standings.among(records, str(Spec("HBVM", HBVM().options())))), None)
+        if default is not None:
+            members[standings.title_of(entry)] = [Ratio.from_records(record, default) for record in records]
+    return members
+
+
+def summary(members: Mapping[str, Sequence[Ratio]]) -> list[Table]:
+    """Return the ratios, one table for each family: a column for each problem, the median and the largest."""
+    others = [ratio for problem in members.values() for ratio in problem if ratio.record != ratio.default]
+    tables = []
+    for family, of_family in grouped_by(lambda ratio: family_of(ratio.record), others).items():
+        rows = []
+        for method, here in grouped_by(lambda ratio: ratio.record.case.method, of_family).items():
+            by_problem = {ratio.record.case.problem: ratio for ratio in here}
+            columns = (by_problem.get(problem[0].record.case.problem) for problem in members.values())
+            medians = [ratio.spread.median for ratio in here if ratio.spread is not None]
+            judged = len(medians) == len(members) and not any(ratio.busy for ratio in here)
+            rows.append(
+                (
+                    method,
+                    *(NONE if r is None else ratio_text(r.spread).partition(" (")[0] for r in columns),
+                    f"{median(medians):.2f}×" if medians else NONE,
+                    f"{max(medians):.2f}×" if medians else NONE,
+                    "judged" if judged else "not judged",
+                )
+            )
+        tables.append(
+            Table(
+                f"Time relative to {DEFAULT}: {family}",
+                ("setting", *members, "median", "largest", "verdict"),
+                rows,
+                f"Not judged: a problem has no time, or other work took more than {OTHER_WORK:.0%} of a core "
+                "while its times were taken.",
+                words=(0, len(members) + 3),
+                key=f"tolerances-{'projection' if tables else 'hbvm'}",
+            )
+        )
+    return tables
+
+
+def details(members: Mapping[str, Sequence[Ratio]]) -> Table:
+    """Return times, counts and errors of every setting on every problem."""
+    rows = [
+        (
+            title if place == 0 else "",
+            ratio.record.case.method,
+            "1" if ratio.record == ratio.default else ratio_text(ratio.spread),
+            *(format_metric(ratio.record, key) for key in METRICS),
+            "" if ratio.record == ratio.default else ratio.verdict,
+        )
+        for title, problem in members.items()
+        for place, ratio in enumerate(problem)
+    ]
+    return Table(
+        "Errors and times",
+        (
+            *("problem", "setting", f"× {DEFAULT}", "time", "steps", "evaluations"),
+            *("energy", "position", "verdict"),
+        ),
+        rows,
+        "In brackets: the quartiles. Less or more time: both quartiles are on one side of 1.",
+        words=(0, 1, 8),
+        key="tolerances-details",
+    )
+
+
+def iterations(counted: Mapping[int, Mapping[str, Iterations]], t_end: float) -> Table:
+    """Return the iterations a step by the size of the lattice."""
+    rows = []
+    for n, by_method in counted.items():
+        cells = []
+        for method in ON_LATTICES:
+            cost = by_method[method]
+            a_step = f"{cost.iterations / cost.steps:.1f}" if cost.steps and not cost.reason else cost.reason
+            cells += [a_step, f"{cost.steps}", cost.solver]
+        rows.append((f"{n}", *cells))
+    heads = [
+        f"{method}, {what}" for method in ON_LATTICES for what in ("iterations a step", "steps", "solver")
+    ]
+    return Table(
+        "Iterations a step on the discrete nonlinear Schroedinger equation",
+        ("places", *heads),
+        rows,
+        f"From a rough start to t = {t_end:g}: `hbvm_bench.studies.costs.lattice`.",
+        words=(3, 6),
+        key="costs-lattices",
+    )
+
+
+def calls(times: Times) -> Table:
+    """Return the time of a call."""
+    return _timed(
+        "A second call of integrate on a problem of one step",
+        CALLED,
+        times,
+        1e6,
+        "µs",
+        f"Kepler's problem to t = {experiments.SHORT:g}; a sample is the mean of {experiments.BATCH} calls, "
+        "each with a method that is made anew; the system is the same.",
+    )
+
+
+def steps(times: Times) -> Table:
+    """Return the time of `run.step()` beyond that of the kernel."""
+    return _timed(
+        "Time of run.step() beyond that of the kernel's step",
+        STEPPED,
+        times,
+        1e6,
+        "µs",
+        f"Kepler's problem to t = {experiments.LONG:g}: the mean time of a step of `integrators.start`, with "
+        "the loop around it, less that of a step of one integration, of the same round.",
+    )
+
+
+def fresh_(times: Times) -> Table:
+    """Return the time to a first result."""
+    return _timed(
+        "Seconds to the first result of a fresh process with empty caches",
+        FIRST,
+        times,
+        1.0,
+        "s",
+        "From the start of Python to the end of `integrate(problems.load('kepler'), method)`, with all "
+        "imports; the caches of compiled code are empty.",
+    )
+
+
+def _timed(title: str, methods: Sequence[str], times: Times, scale: float, unit: str, note: str) -> Table:
+    most = max(times.others, times.stolen)
+    verdict = f"not judged: other work took {most:.0%} of a core" if most > OTHER_WORK else "judged"
+    rows = []
+    for method in methods:
+        samples = [scale * seconds for seconds in times.seconds[method]]
+        spread = Spread.from_samples(samples)
+        quartiles = NONE if spread.low is None else f"{spread.low:.3g} to {spread.high:.3g}"
+        rows.append(
+            (method, f"{spread.median:.3g}", quartiles, f"{min(samples):.3g}", f"{len(samples)}", verdict)
+        )
+    return Table(
+        title,
+        ("method", f"median ({unit})", "quartiles", "best", "samples", "verdict"),
+        rows,
+        note,
+        words=(0, 5),
+        key=f"costs-{title.split()[0].lower()}-{unit}",
+    )
+
+
+def _none(results: Results) -> list:
+    del results
+    return []
