@@ -1,5 +1,8 @@
 """The memory of trajectories that are over, for the next ones of the same program."""
 
+from dataclasses import dataclass
+from typing import Any
+
 from integrators.kernel.context import Context
 from integrators.kernel.native.memory import Content
 
@@ -8,6 +11,14 @@ PAIRS = 4
 
 BYTES = 1 << 18
 """In a context that is spare, at most: beside the steps of such a system a fresh one costs little."""
+
+
+@dataclass(frozen=True, eq=False)
+class Searched:
+    """The memory of a search for events in a trajectory that is over, and the functions that it is for."""
+
+    functions: Any
+    memory: Any
 
 
 class Pair:
@@ -21,6 +32,7 @@ class Pair:
 
     par: bytes | None = None
     """The parameters of what is kept."""
+    searched: Searched | None = None
     _content: tuple[Content, Content] | None = None
 
     def __init__(self, own: Context, partial: Context):

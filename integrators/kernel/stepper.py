@@ -26,7 +26,6 @@ from integrators.kernel.context import (
     Context,
 )
 from integrators.kernel.events.functions import Action, EventFunction
-from integrators.kernel.events.search import KernelSearch
 from integrators.kernel.implicit import engine as solver_engine
 from integrators.kernel.implicit.workspace import Solver, Workspace, report
 from integrators.kernel.line.kept import Kept
@@ -34,6 +33,7 @@ from integrators.kernel.native import binary, engine
 from integrators.kernel.native.memory import address
 from integrators.kernel.pace import FEWEST, Pace
 from integrators.kernel.parts.implicit import ALWAYS_IMPLICIT, AUTO, FOR_VECTORS, NOT_WANTED
+from integrators.kernel.searches import LastingSearch
 from integrators.kernel.spare import Pair, Spare
 from integrators.kernel.step.engine import steps
 from integrators.kernel.tables import Constants
@@ -140,7 +140,7 @@ class HBVMStepper(ABC):
     )  # fmt: skip
     error: Exception | None = None
     """What a function of the user raised, where the status is ``USER_ERROR``."""
-    search: KernelSearch | None = None
+    search: LastingSearch | None = None
     """What looks for events in the steps, see `look_for`."""
     samplings: tuple[str, ...] = SAMPLINGS
     destination: float | None = None
@@ -170,16 +170,21 @@ class HBVMStepper(ABC):
 
     def __del__(self) -> None:
         # A search for events, vectors and records know the memory too, and may be there longer.
-        if self._pair and self.search is None and self._vectors is None and not self._recorded:
+        if self._pair is None or self._vectors is not None or self._recorded:
+            return
+        if self.search is None:
             self._program.spare.give(self._pair)
+        else:
+            self.search.give_when_over(self._program.spare, self._pair)
 
     def look_for(
         self, events: Mapping[str, Event], functions: Sequence[EventFunction], actions: Mapping[str, Action],
         end: float,
     ) -> None:  # fmt: skip
         """Look for events in all steps from here on, up to a time."""
-        contexts, code = (self._context, self._partial), steps.code().address
-        self.search = KernelSearch(events, functions, actions, contexts, code, end)
+        assert self._pair is not None
+        code = steps.code().address
+        self.search = LastingSearch(events, functions, actions, self._pair, code, end)
         self._pace = Pace(CHUNK_WITH_EVENTS, self._dim)
         self._pace.steps = FEWEST
 

@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import problems
-from integrators import HBVM, Gauss, LineIntegral, integrate
+from integrators import HBVM, Event, Gauss, LineIntegral, integrate, integrate_many
+from integrators.events.event import named
 from integrators.kernel import spare
 from integrators.running.integrate import prepared as made_before
 
@@ -94,8 +95,66 @@ def test_what_others_know_stays_theirs():
     records = made.start(KEPLER.y0, KEPLER.par)
     records.record(records.recorder(8))
     del records
-    integrate(KEPLER, HBVM(), 1.0, events=lambda t, y: y[1])
     assert made.spare.take() is None
+
+
+def _searched(program, event, y0, end):
+    start = program.with_events(KEPLER, {"crossing": event})
+    stepper = start(y0, KEPLER.par, 0.0, end)
+    stepper.advance([end])
+    stepper.look_to(end)
+    return start, stepper
+
+
+def test_a_search_for_events_keeps_its_memory_as_long_as_somebody_has_it():
+    made = prepared(HBVM(), KEPLER.system)
+    made.spare = spare.Spare()
+    _, stepper = _searched(made, Event(lambda q: q[1]), KEPLER.y0, 10.0)
+    search = stepper.search
+    del stepper
+    assert made.spare.take() is None
+    found = integrate(KEPLER, HBVM(), 10.0, events=Event(lambda q: q[1], name="crossing")).events["crossing"]
+    assert np.array_equal(search.hits.occurrences()["crossing"].t, found.t)
+    made.spare = spare.Spare()
+    _, stepper = _searched(made, Event(lambda q: q[1]), KEPLER.y0, 10.0)
+    place = stepper._context.address
+    del stepper
+    pair = made.spare.take()
+    assert pair is not None
+    assert pair.own.address == place
+
+
+@pytest.mark.parametrize("method", [HBVM(), HBVM(k=8, s=4, h=0.05)], ids=repr)
+@pytest.mark.parametrize("then", [None, lambda q, p: [q[0], q[1], -p[0], -p[1]]], ids=["looks", "acts"])
+def test_what_was_searched_before_leaves_no_trace(method, then):
+    if then is not None and method.options().get("h"):
+        pytest.skip("no actions with fixed steps")
+    events = [Event(lambda q: q[1], terminal=3, name="a", then=then), Event(lambda q: q[0] - 0.1, name="b")]
+    starts = KEPLER.y0 * np.linspace(0.8, 1.2, 7)[:, None]
+    starts[3] *= -1.0
+    for end in (9.0, -9.0):
+        together = integrate_many(KEPLER, method, starts=starts, times=[end], events=events)
+        for i, y0 in enumerate(starts):
+            made = method.compile(KEPLER.system)  # whose memory is fresh
+            kept = made.with_events(KEPLER, named(events))(y0, KEPLER.par, 0.0, end)
+            kept.advance([end])
+            kept.look_to(end)
+            found = kept.search.hits.occurrences()
+            for name, one in together.events[i].items():
+                for key in ("t", "y", "direction"):
+                    assert np.array_equal(getattr(one, key), getattr(found[name], key)), (i, name, key)
+
+
+def test_a_function_that_raises_at_the_start_leaves_no_trace():
+    def g(q):
+        if q[0] < 0.0:
+            raise RuntimeError("behind")
+        return float(q[1])
+
+    starts = np.array([KEPLER.y0, -KEPLER.y0, KEPLER.y0])
+    made = integrate_many(KEPLER, HBVM(), starts=starts, times=[0.1], events=Event(g, name="g"))
+    assert [str(status) for status in made.status] == ["finished", "user_error", "finished"]
+    assert np.array_equal(made.y[0], made.y[2])
 
 
 def test_an_implicit_solver_that_came_later_is_not_handed_on():
