@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from functools import cache, lru_cache
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,7 @@ from problems.errors import InputError, unknown
 from problems.problem import Problem
 
 OWN_PACKAGES = ("problems", "integrators", "hbvm_bench")
+KERNEL = "integrators.kernel"
 INTEGRATES = "hbvm_bench.measure.raw"  # what a worker process integrates a case with
 # They say, name and keep what is run; all that an integration can depend on of it is in the key. A
 # reference is what it is compared with when it is read.
@@ -217,6 +219,16 @@ def source_digest(method: MethodBase, case: Case) -> str:
 def digest_of(modules: tuple[str, ...]) -> str:
     """Return the sha256 of the `sources` of modules."""
     return hashlib.sha256(json.dumps(sources(modules), sort_keys=True).encode()).hexdigest()
+
+
+@cache
+def kernel_digest() -> str:
+    """Return the sha256 of the kernel's sources; comments, docstrings and the layout do not count."""
+    folder = Path(str(files(KERNEL)))
+    places = (file.relative_to(folder).with_suffix("") for file in folder.rglob("*.py"))
+    named = {".".join((KERNEL, *place.parts)).removesuffix(".__init__") for place in places}
+    kernel = {name: digest for name, digest in sources(named).items() if name in named}
+    return hashlib.sha256(json.dumps(kernel, sort_keys=True).encode()).hexdigest()
 
 
 def sources(modules: Iterable[str]) -> dict[str, str]:

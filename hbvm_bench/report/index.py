@@ -1,15 +1,21 @@
 """What is made of the reports in a directory: the page of each, and their list with a picture of each."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from html import escape
 from pathlib import Path
 
+from hbvm_bench.measure import machine
+from hbvm_bench.report import provenance
 from hbvm_bench.report.html import pages
-from hbvm_bench.report.markdown import plain
+from hbvm_bench.report.markdown import plain, printed
 from hbvm_bench.report.page import document
 from hbvm_bench.store import archive
 from hbvm_bench.store.files import write_all
+from hbvm_bench.store.kept import Kept
+from hbvm_bench.store.records import Record
+from hbvm_bench.summaries import outcomes
+from hbvm_bench.summaries.table import Table
 from problems.errors import InputError
 
 DOCUMENTS = ("README.md", "report.md")  # what a report is read from
@@ -20,6 +26,7 @@ LEAD = (
     "running anything; git ignores them, but for sitnikov's."
 )
 WIDTH = 360  # pixels of a thumbnail
+DIGITS = 12  # of a digest
 LONGEST = 400  # characters of a description
 
 
@@ -53,15 +60,60 @@ def write_index(directory: Path) -> Path:
     if not parts:
         raise InputError(f"the directory {str(directory)!r} holds no report; write one there first.")
     again = f"hbvm-bench report --index {plain(directory.resolve().name)}"
-    text = "\n\n".join(["# Reports", LEAD, *parts, f"This list: `{again}`."]) + "\n"
+    measured = ["## When and where each was measured", printed(conditions(directory))]
+    text = "\n\n".join(["# Reports", LEAD, *parts, *measured, f"This list: `{again}`."]) + "\n"
     write_all({directory / "README.md": text.encode()})
     return directory / "README.md"
 
 
+def conditions(directory: Path) -> Table:
+    """Return the date, the kernel, the processor and the other work of every report, from stored results.
+
+    A report with results of several kinds of processor has a row for each.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If what is stored is damaged.
+    """
+    rows = []
+    for folder in sorted(path for path in directory.iterdir() if _document(path)):
+        if not (folder / archive.NAME).is_file():
+            rows.append((folder.name, *["not recorded"] * 5))
+            continue
+        runs = [run.records() for run in archive.read(folder / archive.NAME)]
+        rows += [(folder.name, *_measured(records)) for records in runs if records]
+    return Table(
+        "",
+        ("report", "date", "processor", "kernel", "other processes", "host"),
+        rows,
+        "Kernel: the first digits of the digest of its sources, without comments. Other processes, host: "
+        "what they used of a core while the times of each problem were taken, the least to the most.",
+        words=range(6),
+        key="conditions",
+    )
+
+
+def _measured(records: Sequence[Record]) -> tuple[str, ...]:
+    described = Kept.machine_of(records)
+    names = dict.fromkeys((str(described.get("processor", "unknown")), machine.kind(described)))
+    kernels = sorted({record.kernel[:DIGITS] for record in records if record.kernel})
+    return (
+        provenance.days(records),
+        ", ".join(names),
+        " and ".join(kernels) or "not recorded",
+        *outcomes.shares(records),
+    )
+
+
+def _document(folder: Path) -> str:
+    """Return the name of a report's text; empty where there is none."""
+    return next((name for name in DOCUMENTS if (folder / name).is_file()), "")
+
+
 def _entry(folder: Path) -> list[str]:
     """Return what the list says of a report, read from the report itself, as paragraphs of markdown."""
-    name = next((name for name in DOCUMENTS if (folder / name).is_file()), None)
-    if name is None:
+    if not (name := _document(folder)):
         return []
     lines = (folder / name).read_text(encoding="utf-8").splitlines()
     title = next((line[2:].strip() for line in lines if line.startswith("# ")), folder.name)

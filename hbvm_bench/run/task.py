@@ -15,7 +15,14 @@ import msgspec
 
 from hbvm_bench.campaign import own
 from hbvm_bench.campaign.file import Limits
-from hbvm_bench.campaign.identity import Resolved, of_method, resolve, versions_of
+from hbvm_bench.campaign.identity import (
+    Resolved,
+    is_ours,
+    kernel_digest,
+    of_method,
+    resolve,
+    versions_of,
+)
 from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.measure import machine
 from hbvm_bench.reference import solutions
@@ -119,6 +126,7 @@ def _executed(asked: Request) -> tuple[bytes, bytes]:
         versions=versions_of(resolved.method),
         machine=machine.describe(),
         finished=datetime.now(UTC).isoformat(timespec="seconds"),
+        kernel=kernel_digest() if is_ours(resolved.method) else "",
     )
     return msgspec.json.encode(record), series
 

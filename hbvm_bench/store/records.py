@@ -339,6 +339,9 @@ class Record(msgspec.Struct, frozen=True, kw_only=True):
         The end of what the process printed, where it crashed.
     versions, machine, finished
         Where and when it was measured.
+    kernel : str
+        The digest of the kernel's sources (`hbvm_bench.campaign.identity.kernel_digest`), of a case of HBVM,
+        Gauss or LineIntegral; ``""`` of others, and where an earlier version of this package ran it.
     """
 
     id: str
@@ -355,6 +358,7 @@ class Record(msgspec.Struct, frozen=True, kw_only=True):
     versions: dict[str, str] = {}
     machine: dict[str, str | int] = {}
     finished: str = ""
+    kernel: str = ""
     schema: int = SCHEMA
 
     def __post_init__(self) -> None:

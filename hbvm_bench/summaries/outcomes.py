@@ -153,6 +153,14 @@ def beside(records: Sequence[Record]) -> list[str]:
     ]
 
 
+def shares(records: Sequence[Record]) -> tuple[str, str]:
+    """Return what other processes used of a core while times were taken, and the host; else why not known."""
+    if loads := _loads(records):
+        return _shares([load.others for load in loads]), _shares([load.stolen for load in loads])
+    why = "not recorded" if _rounds(records) else "no case timed"
+    return why, why
+
+
 def compilations(records: Sequence[Record]) -> list[str]:
     """Return a sentence on how the times of several compilations differ, where there are several."""
     ratios = sorted(

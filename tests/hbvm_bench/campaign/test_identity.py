@@ -172,3 +172,9 @@ def test_another_reference_makes_no_case_stale(monkeypatch):
     before = resolve(Case(problem="kepler", method=PEER)).id
     monkeypatch.setattr("hbvm_bench.reference.solutions.find_file", lambda problem: None)
     assert resolve(Case(problem="kepler", method=PEER)).id == before
+
+
+def test_the_digest_of_the_kernel_is_that_of_its_code():
+    digest = identity.kernel_digest()
+    assert len(digest) == 64
+    assert digest == identity.kernel_digest.__wrapped__()

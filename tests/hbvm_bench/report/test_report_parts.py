@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from hbvm_bench.campaign.file import Campaign, MethodEntry
 from hbvm_bench.report import pack
 from hbvm_bench.report.document import Details
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace, numbers
@@ -17,9 +18,10 @@ from hbvm_bench.report.figures.portraits import crossings
 from hbvm_bench.report.index import write_index
 from hbvm_bench.report.markdown import markdown
 from hbvm_bench.report.page import document, gather
+from hbvm_bench.store.kept import Kept
 from hbvm_bench.store.merge import merge
-from hbvm_bench.store.records import Result
-from hbvm_bench.store.store import Store
+from hbvm_bench.store.records import Load, Result, Timing
+from hbvm_bench.store.store import Index, Store
 from problems.errors import InputError
 from tests.hbvm_bench import made_up_run
 
@@ -116,8 +118,26 @@ def test_the_list_of_reports_says_what_each_is_with_a_picture_and_its_command(tm
     for part in ("A title", "What it is about.", 'src="one/figures/x.png"', "one/report.md", "run one"):
         assert part in text
     assert "unwritten" not in text
+    assert "| one | not recorded |" in text
     (folder / "index.html").write_text("", encoding="utf-8")  # a page that is drawn changes no list
     assert write_index(tmp_path).read_text(encoding="utf-8") == text
+
+
+def test_the_list_of_reports_says_when_and_where_each_was_measured(tmp_path):
+    def timed(**load):
+        return Timing(rounds=made_up_run.timed([1.0]), load=Load(**load), machine=machine)
+
+    machine: dict[str, str | int] = {"processor": "A", "llvm_processor": "znver5", "vector_bits": 512}
+    ours = made_up_run.record(
+        "HBVM()", problem="pendulum()", timing=timed(others=0.02, stolen=0.0), kernel="0123456789abcdef"
+    )
+    peer = made_up_run.record("IAS15()", problem="pendulum()", timing=timed(others=0.3, stolen=0.01))
+    campaign = Campaign(name="one", problems=["pendulum()"], methods=[MethodEntry(use="HBVM()")])
+    index = Index(campaign=campaign, ids=[ours.id], version="0", command="")
+    made_up_run.archived(tmp_path / "one", Kept(index=index, records=[ours, peer]))
+    (tmp_path / "one" / "report.md").write_text("# A title\n", encoding="utf-8")
+    row = "| one | 2026-01-02 | A, znver5-512bit | 0123456789ab | 2% to 30% | 0% to 1% |"
+    assert row in write_index(tmp_path).read_text(encoding="utf-8")
 
 
 def test_a_directory_without_reports_has_no_list(tmp_path):
