@@ -2,31 +2,41 @@
 
 The vectors follow the steps of the trajectory and are made orthonormal again and again, ``V = Q R``; the
 logarithms of the diagonal of R, added up, grow like the exponents (G. Benettin, L. Galgani, A. Giorgilli,
-J.-M. Strelcyn, Meccanica 15 (1980), 9-20 and 21-30). The mean square of a few cosine transforms of the growth
+J.-M. Strelcyn, Meccanica 15 (1980), 9-20 and 21-30). The next round of steps is as long as the growth in the
+last one allows; where the vectors grew too differently all the same, the rounds since a checkpoint are
+repeated with fewer steps each. The mean square of a few cosine transforms of the growth
 is the variance of its average times the time, where the time is long (E. Lazarus, D. J. Lewis, J. H. Stock,
 M. W. Watson, J. Business and Economic Statistics 36 (2018), 541-559): Student's distribution then gives an
 interval.
 """
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
 from integrators import registry
 from integrators.dynamics.vectors import with_variations
-from integrators.protocol import Array, MethodBase, Samples, Status
+from integrators.protocol import Array, MethodBase, Status
 from problems.checks import at_least, checked_arguments
 from problems.errors import InputError
 from problems.problem import Problem
 
-ROUNDS = 2048  # times that the vectors are made orthonormal
+INTERVALS = 2048  # of equal length, at whose ends at least the vectors are made orthonormal
 # How sure an exponent is follows from the slowest fluctuations of the growth, those like cos(pi k t/T). What
 # a vector has grown by at the end of a part of the time depends on its direction there: averages over 8 parts
 # made the intervals of Lorenz' exponent, T = 200, 1.8 times as long as they should be, over 32 parts 4 times.
 WAVES = 8
 STUDENT = 2.3060  # the 97.5 % quantile of Student's distribution with WAVES degrees of freedom
-PARALLEL = 1e14  # vectors that have grown so differently between two rounds cannot be told apart
+# Logarithms of the ratio of the longest vector to the shortest after a round. The relative error of the
+# shortest is the rounding unit times this ratio.
+AIM = np.log(1e5)  # what a round's number of steps is chosen for,
+LIMIT = np.log(1e9)  # and above which it is repeated
+RANGE = 25.0  # the logarithm of a length itself may be so many times as large: doubles end at exp(709)
+FIRST = 16  # steps of the first round
+LONGER = 4  # times as many steps in the next round, at most
+ROOM = 1 << 24  # bytes of the vectors of a round's steps, at most
+REPEATED = 64  # rounds from one checkpoint to the next: one takes the time of several short rounds
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +57,8 @@ class Exponents:
         system: with `Gauss` this is rounding.
     time : float
         The time T that they are averages over.
+    rounds : int
+        How many times the vectors were made orthonormal.
     status, reason
         How the integration ended; after a failure, the averages are those up to there.
     """
@@ -56,6 +68,7 @@ class Exponents:
     sum: float
     pairs: float | None
     time: float
+    rounds: int
     status: Status
     reason: str
 
@@ -108,28 +121,99 @@ def lyapunov(
         raise InputError(f"t_end={end!r} leaves no time after t0={problem.t0!r} and skip={skip!r}.")
     stepper = with_variations(problem, method)
     frame, none = _frame(system.dim, system.dof)[:, :n], np.zeros((system.n_par, n))
-    stepper.follow(frame, none)
-    times, growth, samples = [], [], None
-    rounds = np.linspace(problem.t0, end, ROUNDS + 1)[1:]
-    for t in rounds.tolist():
-        samples = stepper.advance([t], sample="steps")
-        if samples.status is not Status.FINISHED:
-            break
-        if not samples.t.size:
-            continue
-        frame, triangle = np.linalg.qr(stepper.variations[-1])
-        sizes = np.abs(np.diag(triangle))
-        if not sizes.min() * PARALLEL > sizes.max():
-            raise InputError(f"in {end - problem.t0!r} vectors grow too differently; give a shorter t_end.")
-        stepper.follow(frame, none)
-        times.append(stepper.t)
-        growth.append(np.log(sizes))
-    assert samples is not None
-    if np.count_nonzero(np.array(times) >= problem.t0 + skip) <= 2 * WAVES:
-        why = samples.reason or "give a later t_end or shorter steps."
+    marks = np.linspace(problem.t0, end, INTERVALS + 1)[1:]
+    if np.count_nonzero(marks >= problem.t0 + skip) <= 2 * WAVES:
+        raise InputError(f"skip={skip!r} leaves too little of the time for intervals; give a later t_end.")
+    course = _Rounds(stepper, frame, none)
+    status, reason = course.through(marks)
+    counted = np.isfinite(course.times)
+    times, growth = course.times[counted], course.growth[counted]
+    if np.count_nonzero(times >= problem.t0 + skip) <= 2 * WAVES:
+        why = reason or "give a later t_end or shorter steps."
         raise InputError(f"there are too few steps after skip={skip!r} for intervals: {why}")
     canonical = system.dof is not None and n == system.dim
-    return _averaged(problem.t0 + skip, np.array(times), np.array(growth), canonical, samples)
+    exponents, intervals, pairs, time = _averaged(problem.t0 + skip, times, growth, canonical)
+    return Exponents(exponents, intervals, float(exponents.sum()), pairs, time, course.rounds, status, reason)
+
+
+class _Rounds:
+    """A frame that follows a trajectory and is made orthonormal after each round of steps.
+
+    Attributes
+    ----------
+    times : ndarray, shape (m,)
+        The end of the last step in each of m intervals; NaN where there is none.
+    growth : ndarray, shape (m, n)
+        The logarithms of the diagonal of R, added up in each of them.
+    rounds : int
+        How many there were.
+    """
+
+    def __init__(self, stepper: Any, frame: Array, none: Array):
+        self._stepper, self._none, self._room = stepper, none, max(1, ROOM // frame.nbytes)
+        self._n, self.rounds = frame.shape[1], 0
+        stepper.follow(frame, none)
+
+    def through(self, marks: Array) -> tuple[Status, str]:
+        """Take rounds up to the last of some times, none beyond the next of them; return how it ended.
+
+        Raises
+        ------
+        problems.errors.InputError
+            If the vectors grow too differently in a single step.
+        """
+        stepper, i, steps = self._stepper, 0, min(FIRST, self._room)
+        self.times, self.growth = np.full(marks.size, np.nan), np.zeros((marks.size, self._n))
+        most, passed = self._room, -np.inf  # steps of a round before a time where one was too long
+        saved = self._saved(i)
+        while i < marks.size:
+            if stepper.t > passed:
+                most = self._room
+            if self.rounds >= saved[1] + REPEATED:
+                saved = self._saved(i)
+            asked = min(steps, most)
+            samples = stepper.march(float(marks[i]), asked)
+            if samples.status is not Status.FINISHED:
+                return samples.status, samples.reason
+            taken = samples.t.size
+            if taken:
+                frame, sizes, extent = _factors(stepper.variations[-1])
+                if not extent <= LIMIT:
+                    if taken == 1:
+                        where = f"in the step to t = {stepper.t!r}"
+                        raise InputError(f"{where} vectors grow too differently; take shorter steps.")
+                    most, passed = min(most, taken // 2), max(passed, stepper.t)
+                    i = self._back_to(saved)
+                    continue
+                stepper.follow(frame, self._none)
+                self.times[i] = stepper.t
+                self.growth[i] += sizes
+                self.rounds += 1
+                steps = int(min(max(taken * AIM / max(extent, 1e-9), 1.0), LONGER * steps, self._room))
+            if taken < asked:
+                i += 1
+        return Status.FINISHED, ""
+
+    def _saved(self, i: int) -> tuple[Any, int, int, float, Array]:
+        """Return what `_back_to` needs, in the interval with number i."""
+        return self._stepper.checkpoint(), self.rounds, i, float(self.times[i]), self.growth[i].copy()
+
+    def _back_to(self, saved: tuple[Any, int, int, float, Array]) -> int:
+        """Go back, and return the number of the interval."""
+        checkpoint, self.rounds, i, time, growth = saved
+        self._stepper.restore(checkpoint)
+        self.times[i:], self.growth[i:] = np.nan, 0.0
+        self.times[i], self.growth[i] = time, growth
+        return i
+
+
+def _factors(vectors: Array) -> tuple[Array, Array, float]:
+    """Return Q, the logarithms of the diagonal of R, and how large they and their differences are."""
+    with np.errstate(all="ignore"):  # vectors that have left the range of doubles are found by the result
+        frame, triangle = np.linalg.qr(vectors)
+        sizes = np.log(np.abs(np.diag(triangle)))
+        extent = max(float(np.ptp(sizes)), float(np.abs(sizes).max()) / RANGE)
+    return frame, sizes, extent
 
 
 def _frame(dim: int, dof: int | None) -> Array:
@@ -143,8 +227,10 @@ def _frame(dim: int, dof: int | None) -> Array:
     return np.concatenate([first, second[:, ::-1]], axis=1)
 
 
-def _averaged(start: float, times: Array, growth: Array, canonical: bool, samples: Samples) -> Exponents:
-    """Return exponents and intervals from what the vectors have grown by, up to each of some times."""
+def _averaged(
+    start: float, times: Array, growth: Array, canonical: bool
+) -> tuple[Array, Array, float | None, float]:
+    """Return exponents, intervals, pairs and the time, from the growth of vectors between times."""
     first = int(np.searchsorted(times, start))
     grown, ends = np.cumsum(growth, axis=0)[first:], times[first:]
     time = float(ends[-1] - ends[0])
@@ -158,6 +244,4 @@ def _averaged(start: float, times: Array, growth: Array, canonical: bool, sample
     order = np.argsort(-exponents)
     exponents, half = exponents[order], half[order]
     intervals = np.stack([exponents - half, exponents + half], axis=1)
-    return Exponents(
-        exponents, intervals, float(exponents.sum()), pairs, time, samples.status, samples.reason
-    )
+    return exponents, intervals, pairs, time

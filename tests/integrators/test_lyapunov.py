@@ -1,11 +1,14 @@
 """Exponents of systems where they are known, and what must hold of all."""
 
+import math
+
 import numpy as np
 import pytest
 
 import problems
 from integrators import HBVM, Gauss
 from integrators.dynamics import lyapunov
+from integrators.dynamics.lyapunov import _Rounds
 from problems import InputError, Problem, VectorField
 
 
@@ -35,6 +38,67 @@ def test_a_linear_field_has_its_eigenvalues():
     system = VectorField(lambda y: [0.3 * y[0], -0.2 * y[1] + y[0]], dim=2)
     found = lyapunov(Problem(system, y0=[1e-3, 1.0], t_end=50.0), HBVM(k=6, s=6, h=0.1), count=1, skip=25.0)
     assert abs(found.exponents[0] - 0.3) < 1e-5  # the second has died out by exp(-0.5 * 25)
+
+
+def test_strong_growth_takes_more_rounds():
+    """The first component grows by exp(80,000) over the time."""
+    system = VectorField(lambda y: [40.0 * y[0] + y[1], -30.0 * y[1] + y[2], y[2]], dim=3)
+    problem = Problem(system, y0=[0.0, 0.0, 0.0], t_end=2000.0)
+    found = lyapunov(problem, Gauss(s=6, h=0.025), skip=10.0)
+    assert np.abs(found.exponents - [40.0, 1.0, -30.0]).max() < 1e-7  # measured: 1e-11
+    assert found.rounds > 10000  # measured: 14,335
+
+
+def test_a_stiff_ratio_of_rates():
+    system = VectorField(lambda y: [-0.1 * y[0] + y[1], -1000.0 * y[1], 0.2 * y[2]], dim=3)
+    problem = Problem(system, y0=[0.0, 0.0, 0.0], t_end=100.0)
+    found = lyapunov(problem, Gauss(s=6, h=2e-3), skip=60.0)
+    assert np.abs(found.exponents - [0.2, -0.1, -1000.0]).max() < 5e-6  # measured: 8e-7, Gauss's error
+
+
+def test_rounds_that_were_too_long_are_repeated(monkeypatch):
+    """Rates that come to 200 and -200 within some steps, and are small before and after."""
+
+    def burst(t, y, m):
+        rate = 0.1 + 400.0 / math.sqrt(math.pi) * m.exp(-((t - 250.3) ** 2) / 0.25)
+        return [rate * y[0], -rate * y[1]]
+
+    system = VectorField(burst, dim=2)
+    problem = Problem(system, y0=[0.0, 0.0], t_end=500.0)
+    repeated, back_to = [], _Rounds._back_to
+    monkeypatch.setattr(_Rounds, "_back_to", lambda *given: repeated.append(1) or back_to(*given))
+    found = lyapunov(problem, Gauss(s=6, h=0.005), skip=150.0)
+    exact = 200.0 + 0.1 * found.time
+    assert np.abs(found.exponents * found.time - [exact, -exact]).max() < 1e-8  # measured: 5e-11
+    assert found.rounds > 2048  # measured: 2081
+    assert repeated
+
+
+def test_too_much_growth_in_one_step_is_refused():
+    """The implicit midpoint rule multiplies by (1 + hz/2)/(1 - hz/2), here 2e11."""
+    system = VectorField(lambda y: [4.0 * (1.0 - 1e-11) * y[0], y[1]], dim=2)
+    with pytest.raises(InputError, match="take shorter steps"):
+        lyapunov(Problem(system, y0=[0.0, 0.0], t_end=1e4), Gauss(s=1, h=0.5))
+
+
+def test_a_skip_that_leaves_too_little_is_refused():
+    problem = problems.load("henon_heiles")
+    for skip in (99.5, 99.9999):
+        with pytest.raises(InputError, match="skip="):
+            lyapunov(problem, Gauss(s=6, h=0.25), t_end=100.0, skip=skip)
+
+
+@pytest.mark.slow
+def test_lorenz_over_a_long_time():
+    system = VectorField(lorenz, dim=3, parameters={"s": 10.0, "r": 28.0, "b": 8.0 / 3.0})
+    problem = Problem(system, y0=[1.0, 1.0, 20.0], t_end=1e5)
+    found = lyapunov(problem, Gauss(s=6, h=0.02), skip=20.0)
+    # measured: 0.90513 with the interval 0.90428 to 0.90597, -3e-6, -14.57179; sum + 41/3: 3e-12
+    assert found.intervals[0, 0] < 0.90563 < found.intervals[0, 1]
+    assert np.diff(found.intervals[0]) < 0.003
+    assert abs(found.exponents[1]) < 1e-4
+    assert abs(found.sum + 41.0 / 3.0) < 1e-10
+    assert found.rounds > 1e5  # 155,572
 
 
 @pytest.mark.slow

@@ -1,7 +1,7 @@
 """Lyapunov exponents of the systems by our tangent vectors and by heyoka's variational equations, with times.
 
-Both sides follow the same start to the same end, make all tangent vectors orthonormal at the same times, and
-are compiled before; their runs alternate in one process.
+Both sides follow the same start to the same end, make all tangent vectors orthonormal equally often, and are
+compiled before; their runs alternate in one process.
 """
 
 import time
@@ -15,7 +15,7 @@ import numpy as np
 from hbvm_bench.measure import machine
 from hbvm_bench.measure.timing import busy, interleaved, load_between, no_collection
 from hbvm_bench.studies.chaos.systems import SKIP, SYSTEMS
-from integrators.dynamics.lyapunov import ROUNDS, Exponents, lyapunov
+from integrators.dynamics.lyapunov import Exponents, lyapunov
 from integrators.dynamics.vectors import random_vectors
 from integrators.methods.hbvm import HBVM
 from integrators.protocol import Array, Status
@@ -79,9 +79,9 @@ def measured(name: str, share: float = 1.0, samples: int = SAMPLES) -> Measured:
 
     ours = partial(lyapunov, problem, METHOD, skip=SKIP)
     with machine.staying_on_a_core(), no_collection():
-        ours()
+        runs = [("ours", ours), ("heyoka", partial(theirs.run, ours().rounds))]
         before = busy()
-        seconds = interleaved([partial(sample, "ours", ours), partial(sample, "heyoka", theirs.run)], samples)
+        seconds = interleaved([partial(sample, *run) for run in runs], samples)
         load = load_between(before, busy())
     mine: Exponents = results["ours"]
     if mine.status is not Status.FINISHED:
@@ -116,8 +116,8 @@ class Variational:
         self._taylor = hy.taylor_adaptive(equations, problem.y0.tolist(), tol=TOLERANCE, pars=problem.par)
         self._finished = hy.taylor_outcome.time_limit
 
-    def run(self) -> Array:
-        """Return the exponents, the largest first.
+    def run(self, rounds: int) -> Array:
+        """Return the exponents, the largest first, of vectors that are made orthonormal so many times.
 
         Raises
         ------
@@ -129,7 +129,7 @@ class Variational:
         taylor.state[:dim] = problem.y0
         # unit vectors may lie in a subspace that the linearised flow leaves only by rounding
         taylor.state[dim:] = random_vectors(dim, dim).ravel()
-        times = np.linspace(problem.t0, problem.t_end, ROUNDS + 1)[1:]
+        times = np.linspace(problem.t0, problem.t_end, rounds + 1)[1:]
         growth = np.zeros((times.size, dim))
         for i, t in enumerate(times.tolist()):
             if taylor.propagate_until(t)[0] != self._finished:

@@ -32,7 +32,7 @@ def test_the_divergence_is_the_trace_of_the_jacobian(name):
 def test_heyoka_and_we_have_the_same_sum_of_exponents():
     """Thomas's exponents are small, so rounding has not parted the trajectories at this end."""
     problem = SYSTEMS["thomas"].problem(0.003)
-    theirs = exponents.Variational(problem).run()
+    theirs = exponents.Variational(problem).run(2048)
     ours = lyapunov(problem, exponents.METHOD, skip=SKIP)
     assert theirs.sum() == pytest.approx(ours.sum, abs=1e-11)
     assert ours.sum == pytest.approx(-0.54, abs=1e-11)
