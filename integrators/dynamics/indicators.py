@@ -17,7 +17,7 @@ from problems.checks import at_least, checked_arguments
 from problems.errors import InputError
 from problems.problem import Problem
 
-SAMPLES = 2048  # at which the vectors are looked at, by default
+SAMPLES = 2048  # by default
 
 Samples = Annotated[int, at_least(2)]
 
@@ -64,8 +64,8 @@ def megno(
     the time from 0 to t. It tends to 2 for quasi-periodic orbits of nonlinear systems, to 0 for linear
     oscillators, and grows as lambda t / 2, with the largest exponent lambda, for chaotic orbits.
 
-    Integrated by parts, Y(t) = 2 log d(t) - 2/t int log d ds. Both integrals are sums of trapezoids over the
-    samples: with the length growing like the time, 2048 samples change the limit by less than 1e-4.
+    Integrated by parts, Y(t) = 2 log d(t) - 2/t int log d ds. Both integrals are sums of trapezoids over all
+    steps, added up as the vector follows the trajectory.
 
     Parameters
     ----------
@@ -76,8 +76,8 @@ def megno(
     t_end : float, optional
         The end; by default the problem's.
     samples : int
-        How often to look at the vector, in equal distances but for a dense beginning. With a fixed step size
-        it is looked at after whole steps, so there may be fewer.
+        How many values to return, in equal distances but for a dense beginning: each at the end of a step,
+        the last at ``t_end``. There are fewer where steps are long. The values do not depend on it.
 
     Returns
     -------
@@ -97,12 +97,23 @@ def megno(
     >>> bool(abs(found.value - 2.0) < 0.05)
     True
     """
-    t, _, logarithms, course = _followed(problem, method, 1, t_end, samples)
-    times = np.concatenate([[0.0], t - problem.t0])
-    lengths = np.concatenate([[0.0], logarithms[:, 0]])
-    growth = np.zeros(times.size)
-    growth[1:] = 2.0 * (lengths[1:] - _integral(times, lengths) / times[1:])
-    return Indicator(t, _integral(times, growth) / times[1:], course.status, course.reason, course.steps)
+    method = registry.create("HBVM") if method is None else method
+    times = sampling_times(problem, method, t_end, samples)
+    course = Course(problem, method, random_vectors(problem.system.dim, 1))
+    t_, values = [times[:0]], [times[:0]]
+    time = length = growth = integral = total = 0.0  # at the last step: log d, Y and both integrals
+    for chunk in course.by_steps(float(times[-1])):
+        t = np.concatenate([[time], chunk.t - problem.t0])
+        lengths = np.concatenate([[length], chunk.logarithms[:, 0]])
+        integrals = integral + _integral(t, lengths)
+        growths = np.concatenate([[growth], 2.0 * (lengths[1:] - integrals / t[1:])])
+        totals = total + _integral(t, growths)
+        passed = np.searchsorted(times - problem.t0, t, side="right")
+        wanted = np.diff(passed) > 0
+        t_.append(chunk.t[wanted])
+        values.append((totals / t[1:])[wanted])
+        time, length, growth, integral, total = t[-1], lengths[-1], growths[-1], integrals[-1], totals[-1]
+    return Indicator(np.concatenate(t_), np.concatenate(values), course.status, course.reason, course.steps)
 
 
 @checked_arguments
@@ -118,7 +129,8 @@ def sali(
     On chaotic orbits it falls like exp(-(lambda_1 - lambda_2) t), down to rounding; on regular orbits of
     systems with two degrees of freedom or more it stays of the order of 1.
 
-    Parameters, returns and errors are those of `megno`.
+    Parameters, returns and errors are those of `megno`, but ``samples`` says how often to look at the
+    vectors. With a fixed step size that is after whole steps, so there may be fewer.
 
     Examples
     --------
@@ -154,7 +166,7 @@ def gali(
     k : int
         How many vectors, 2 to the dimension of the state.
 
-    Other parameters, returns and errors are those of `megno`.
+    Other parameters, returns and errors are those of `sali`.
 
     Examples
     --------
@@ -182,7 +194,7 @@ def finite_time_exponent(
     A map of it over starts shows the separatrices of a flow. Unlike the exponent, it is a function of the
     start and of the time, and knows no average.
 
-    Parameters, returns and errors are those of `megno`.
+    Parameters, returns and errors are those of `sali`.
 
     Examples
     --------

@@ -17,7 +17,7 @@ from problems import Problem
 from problems.catalogue.cr3bp import cr3bp
 from problems.catalogue.henon_heiles import henon_heiles
 
-SAMPLES = 256  # at which a tangent vector is looked at
+SAMPLES = 256  # of MEGNO along an orbit, of which the last is drawn
 
 PER_TURN = 32
 SITNIKOV = Gauss(s=6, h=axis_motion.TURN / PER_TURN)  # in the eccentric anomaly

@@ -22,8 +22,7 @@ LORENZ_END, LORENZ_SKIP = 1000.0, 20.0
 PAIRS = Gauss(s=8, h=0.5)
 MEGNO = Gauss(s=6, h=0.25)
 MEGNO_END = 1e6
-FINE = 65536  # samples: with 2048 the vector's oscillations, seen so rarely, change the mean by 0.02
-DRAWN = 400  # of them
+DRAWN = 400  # of the values
 
 # Sun, Jupiter and Saturn: years of 2 pi, the Sun's mass, astronomical units
 JUPITER = {"m": 0.000954, "a": 5.204, "M": 0.6, "omega": 0.257, "e": 0.048}
@@ -99,9 +98,9 @@ def curves(share: float = 1.0) -> Curves:
     )
     exponent = lyapunov(chaotic, MEGNO, count=1)
     return Curves(
-        regular=_curve(megno(regular, MEGNO, samples=FINE)),
-        chaotic=_curve(megno(chaotic, MEGNO, samples=FINE)),
-        linear=_curve(megno(linear, MEGNO, samples=FINE)),
+        regular=_curve(megno(regular, MEGNO)),
+        chaotic=_curve(megno(chaotic, MEGNO)),
+        linear=_curve(megno(linear, MEGNO)),
         exponent=float(exponent.exponents[0]),
         interval=exponent.intervals[0],
     )
