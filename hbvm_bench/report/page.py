@@ -36,7 +36,14 @@ Made = Block | Sequence[Block] | None
 DRAWN_CASES = 300  # of a larger campaign the first so many are drawn: a figure takes seconds
 HERE, STUDIES = "hbvm_bench.report.campaign", "hbvm_bench.studies"
 DEFAULT = (
-    *("goals_reached", "overview_of_many", "what_came_out", "overview_of_one", "problems_in_turn"),
+    *(
+        "goals_reached",
+        "best_compilations",
+        "overview_of_many",
+        "what_came_out",
+        "overview_of_one",
+        "problems_in_turn",
+    ),
     *("fairness", "raw_data", "run_again", "sources"),
 )
 """The blocks of a campaign that names none."""

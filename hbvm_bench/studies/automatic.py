@@ -19,7 +19,7 @@ from hbvm_bench.report.figures.style import INK, MUTED, PAPER, base
 from hbvm_bench.report.page import Results, block
 from hbvm_bench.store.kept import Kept
 from hbvm_bench.store.records import Record
-from hbvm_bench.summaries import outcomes, standings
+from hbvm_bench.summaries import compilations, outcomes, standings
 from hbvm_bench.summaries.goals import Verdict, verdicts
 from hbvm_bench.summaries.points import accurate
 from hbvm_bench.summaries.rows import format_metric, status_of
@@ -142,7 +142,10 @@ def _run(run: Kept) -> list[Block]:
                 ]
             )
         ),
-        *attempt(("errors and times", partial(sides, duels(run)))),
+        *attempt(
+            ("errors and times", partial(sides, duels(run))),
+            ("the compilations", partial(compilations.table, run.index.campaign, run.records)),
+        ),
         f"Measured on {run.started[:10]} with {libraries}: `{run.command}`",
     ]
 

@@ -1,6 +1,6 @@
 """Times by compilation: median and spread of each library's fastest setting, and its best beside them."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from statistics import median
 
 from hbvm_bench.campaign.file import Campaign
@@ -12,6 +12,8 @@ from hbvm_bench.summaries.rows import seconds
 from hbvm_bench.summaries.table import NONE, Table
 
 OURS = "HBVM and Gauss"
+SPREAD = ("compilations", "median", "best", "slowest over best")
+"""The columns of `spread`."""
 
 
 def table(campaign: Campaign, records: Sequence[Record]) -> Table | None:
@@ -19,39 +21,35 @@ def table(campaign: Campaign, records: Sequence[Record]) -> Table | None:
 
     Of the settings that reach what the problem asks for. ``None`` where nothing was compiled several times.
     """
-    rows = []
+    fastest = []
     for entry, here in standings.entries(campaign, records):
         libraries = {OURS: standings.among(here, "")} | by_family(
             [setting for setting in here if not is_hbvm_or_gauss(setting)]
         )
-        fastest = {name: standings.best(those, entry.within) for name, those in libraries.items()}
-        times = {name: by_compilation(setting) for name, setting in fastest.items() if setting is not None}
+        best = {name: standings.best(those, entry.within) for name, those in libraries.items()}
+        fastest.append((standings.title_of(entry), best))
+    return of_settings(fastest)
+
+
+def of_settings(fastest: Sequence[tuple[str, Mapping[str, Record | None]]]) -> Table | None:
+    """Return the times of the compilations of given settings: by library, on each problem by its title.
+
+    ``None`` where none of them was compiled several times.
+    """
+    rows = []
+    for title, by_library in fastest:
+        times = {name: by_compilation(record) for name, record in by_library.items() if record is not None}
         ours = min(times.get(OURS, []), default=None)
-        for name, table_rows in times.items():
-            if len(table_rows) < 2:
+        for name, record in by_library.items():
+            if record is None or len(times[name]) < 2:
                 continue
-            record = fastest[name]
-            best = min(table_rows)
-            rows.append(
-                (
-                    standings.title_of(entry),
-                    name,
-                    NONE if record is None else record.case.method,
-                    f"{len(table_rows)}",
-                    seconds(median(table_rows)),
-                    seconds(best),
-                    f"{max(table_rows) / best:.2f}",
-                    NONE if ours is None else f"{best / ours:.3g}×",
-                )
-            )
+            relative = NONE if ours is None else f"{min(times[name]) / ours:.3g}×"
+            rows.append((title, name, record.case.method, *spread(times[name]), relative))
     if not rows:
         return None
     return Table(
         "The best of the compilations beside their median",
-        (
-            *("problem", "library", "fastest setting", "compilations"),
-            *("median", "best", "slowest over best", "best over best of HBVM and Gauss"),
-        ),
+        ("problem", "library", "fastest setting", *SPREAD, "best over best of HBVM and Gauss"),
         rows,
         "Each compilation, in a fresh process with empty caches, has the median of its samples. The same "
         "code may be slower where it lies otherwise in memory: the best compilation is what a library can "
@@ -59,3 +57,9 @@ def table(campaign: Campaign, records: Sequence[Record]) -> Table | None:
         words=(0, 1, 2),
         key="compilations",
     )
+
+
+def spread(times: Sequence[float]) -> tuple[str, str, str, str]:
+    """Return how often something was compiled, its median and best time, and the slowest over the best."""
+    best = min(times)
+    return f"{len(times)}", seconds(median(times)), seconds(best), f"{max(times) / best:.2f}"

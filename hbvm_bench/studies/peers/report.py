@@ -13,6 +13,7 @@ from hbvm_bench.report.page import Results, block
 from hbvm_bench.store.kept import Kept
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries import outcomes
+from hbvm_bench.summaries.compilations import SPREAD, spread
 from hbvm_bench.summaries.rows import Task, at_once, reason_of, tasks
 from hbvm_bench.summaries.rows import seconds as in_words
 from hbvm_bench.summaries.standings import compare
@@ -126,6 +127,26 @@ def table(measured: Sequence[Pair]) -> Table:
     )
 
 
+def compiled(measured: Sequence[Pair]) -> Table | None:
+    """Return the compilations of each pair; ``None`` where nothing was compiled several times."""
+    rows = [
+        (pair.bench.case.method, pair.task.problem, where, *spread(times))
+        for pair in measured
+        for where, record in (("bench", pair.bench), ("alone", pair.alone))
+        if len(times := outcomes.by_compilation(record)) > 1
+    ]
+    if not rows:
+        return None
+    return Table(
+        "The best of the compilations beside their median",
+        ("method", "problem", "through", *SPREAD),
+        rows,
+        "Each compilation, in a fresh process with empty caches, has the median of its samples.",
+        words=(0, 1, 2),
+        key="compilations",
+    )
+
+
 @block
 def costs(results: Results) -> list[Section]:
     """Return for each kind of processor the table, what did not run, and where it was measured."""
@@ -143,10 +164,11 @@ def _run(results: Results, run: Kept) -> list[Block]:
         if pair.failed
     ]
     libraries = ", ".join(f"{name} {number}" for name, number in run.versions.items())
-    said = [machine.sentence(run.machine), *outcomes.beside(run.records)]
+    said = [machine.sentence(run.machine), *outcomes.compilations(run.records), *outcomes.beside(run.records)]
     why: list[Block] = ["Not run:", Items(refused)] if refused else []
     measured = f"Measured on {run.started[:10]} with {libraries}: `{run.command}`"
-    return [table(measured_pairs), *why, Note(" ".join(said)), measured]
+    tables = [table(measured_pairs), *([again] if (again := compiled(measured_pairs)) else [])]
+    return [*tables, *why, Note(" ".join(said)), measured]
 
 
 def _is_alone(record: Record) -> bool:

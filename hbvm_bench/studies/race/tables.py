@@ -9,7 +9,7 @@ from hbvm_bench.store.records import Record
 from hbvm_bench.studies.race.families import FAMILIES, OURS, Row
 from hbvm_bench.studies.race.probe import Probe
 from hbvm_bench.studies.race.results import ERRORS, Race, counts
-from hbvm_bench.summaries import outcomes, standings
+from hbvm_bench.summaries import compilations, outcomes, standings
 from hbvm_bench.summaries.goals import ratio_text
 from hbvm_bench.summaries.goals import table as goals_table
 from hbvm_bench.summaries.rows import format_metric, group_of, seconds, status_of
@@ -184,6 +184,13 @@ def fastest(race: Race) -> Table:
         "× HBVM and Gauss: relative to the fastest of their settings that compete with the other families.",
         words=(0, 1),
     )
+
+
+def compiled(race: Race) -> Table | None:
+    """Return the compilations of the fastest settings that compete; ``None`` where there is one of each."""
+    best = {family: race.best(family, *race.asked) for family in race.families}
+    names = {family: compilations.OURS if family == OURS else FAMILIES[family].short for family in best}
+    return compilations.of_settings([(race.title, {names[f]: record for f, record in best.items()})])
 
 
 def levels(race: Race) -> Table:

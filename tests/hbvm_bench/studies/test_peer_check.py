@@ -151,6 +151,23 @@ def test_a_row_is_marked_where_the_bench_costs_too_much_or_steps_differ(pair, be
     assert ("(beyond)" in report.table([pair]).rows[0][2]) is beyond
 
 
+def test_the_best_compilation_stands_beside_the_median_through_the_bench_and_alone():
+    def recompiled(record):
+        rounds = [
+            msgspec.structs.replace(one, compilation=i, samples=[seconds])
+            for i, (one, seconds) in enumerate(zip(record.timing.rounds, (0.2, 0.1, 0.3), strict=True))
+        ]
+        return msgspec.structs.replace(record, timing=msgspec.structs.replace(record.timing, rounds=rounds))
+
+    pair = made_up()
+    assert report.compiled([pair]) is None
+    table = report.compiled([replace(pair, bench=recompiled(pair.bench), alone=recompiled(pair.alone))])
+    assert table is not None
+    assert [row[2:] for row in table.rows] == [
+        (where, "3", "200 ms", "100 ms", "3.00") for where in ("bench", "alone")
+    ]
+
+
 def test_a_peer_that_did_not_run_is_named_and_not_healthy():
     failed = msgspec.structs.replace(made_up().bench, result=Result(outcome="refused", reason="no AVX-512"))
     pair = replace(made_up(), bench=failed)
