@@ -1,11 +1,13 @@
 """Indicators of chaos where their values are known."""
 
+import math
+
 import numpy as np
 import pytest
 import scipy.linalg
 
 import problems
-from integrators import HBVM, Gauss, Status
+from integrators import HBVM, Gauss, Status, integrate
 from integrators.dynamics import finite_time_exponent, gali, indicator_map, lyapunov, megno, sali
 from problems import Hamiltonian, InputError, Problem, VectorField
 
@@ -71,6 +73,48 @@ def test_alignment_indices_tell_chaos():
         late = volume.t > 300.0
         slope = np.polyfit(np.log(volume.t[late]), np.log(volume.values[late]), 1)[0]
         assert abs(slope + power) < 0.5, power
+
+
+@pytest.mark.parametrize("coupling", [0.0, 0.01, 0.05])
+def test_volumes_on_a_torus_of_three_dimensions_follow_their_powers(coupling):
+    """GALI_k is constant for k <= 3, then falls like t^-(2 (k - 3)) (Skokos et al. 2007)."""
+
+    def energy(q, p):
+        oscillators = q[0] ** 4 + q[1] ** 4 / 3 + q[2] ** 4 / 2
+        between = q[0] ** 2 * q[1] ** 2 + q[1] ** 2 * q[2] ** 2
+        return (p[0] ** 2 + p[1] ** 2 + p[2] ** 2) / 2 + oscillators + coupling * between
+
+    problem = Problem(Hamiltonian(energy, dof=3), q0=[1.0, 0.3, 0.7], p0=[0.3, 1.2, 0.5], t_end=1e4)
+    for k in range(2, 7):
+        volume = gali(problem, Gauss(s=6, h=0.1), k=k)
+        late = volume.t > 1000.0
+        slope = np.polyfit(np.log(volume.t[late]), np.log(volume.values[late]), 1)[0]
+        assert abs(slope + 2 * max(k - 3, 0)) < 0.1, k  # measured: at most 0.023
+        if k <= 3:
+            assert volume.value > 0.1  # measured: 0.15 to 0.58
+
+
+def test_sali_falls_by_the_difference_of_the_two_largest_exponents():
+    """Lorenz's model of the atmosphere, whose second exponent is positive too."""
+
+    def ring(y, par):
+        return [(y[(i + 1) % 8] - y[i - 2]) * y[i - 1] - y[i] + par.F for i in range(8)]
+
+    system, method = VectorField(ring, dim=8, parameters={"F": 10.0}), Gauss(s=5, h=0.04)
+    y0 = 10.0 + np.random.default_rng(2).standard_normal(8)
+    problem = Problem(system, y0=y0, t_end=4020.0)
+    known = lyapunov(problem, method, count=2, skip=20.0)
+    # measured: 2.122 and 0.748, with intervals of +-0.032 and +-0.034
+    difference, unsure = known.exponents[0] - known.exponents[1], np.diff(known.intervals).sum() / 2
+    times, slopes = np.array([3.0, 15.0]), []
+    for start in integrate(problem, method, np.arange(20.0, 1220.0, 4.0)).y:
+        found = sali(Problem(system, y0=start, t_end=16.0), method, samples=40)
+        first, last = np.interp(times, found.t, np.log(found.values))
+        slopes.append((first - last) / np.diff(times)[0])
+    scatter = 2.0 * np.std(slopes, ddof=1) / math.sqrt(len(slopes))
+    # measured: 1.391 +- 0.053 beside 1.374
+    assert abs(np.mean(slopes) - difference) < scatter + unsure
+    assert scatter < 0.1
 
 
 def test_the_volume_of_two_vectors_is_half_the_product_of_the_two_alignment_indices():
