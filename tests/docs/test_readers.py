@@ -48,6 +48,7 @@ ANSWERS = {
     "What is the licence?": ("faq", ["### What is the licence?", "3-clause BSD"]),
     "How do I treat a chaotic system?": ("faq", ["### How do I treat a chaotic system?", "advise"]),
     "How do I use a force of my own?": ("tutorials/driven", ["## Any first-order system", "VectorField"]),
+    "How do I restart after a crash?": ("faq", ["continue it after a crash?", "`checkpoint=` and `resume=`"]),
     "Does it run on a GPU?": ("faq", ["### Does it run on a GPU?", 'backend="jax"']),
     "How do I choose s?": ("howto/which_method", ["### s", "The order is 2s."]),
     "How do I cite it?": ("faq", ["### How do I cite it?", "CITATION.cff", "hbvm-bench cite"]),
