@@ -644,9 +644,14 @@ class LowParts(Protocol):
     ----------
     low : ndarray, shape (m, dim), or None
         What the samples of the last ``advance`` leave out.
+    pairs : ndarray, shape (dim, 2)
+        The state at exactly the present time.
     """
 
     low: Array | None
+
+    @property
+    def pairs(self) -> Array: ...
 
 
 class AsHBVM(Protocol):

@@ -394,14 +394,7 @@ class Solution:
         problems.errors.InputError
             For a solution that has doubles only.
         """
-        import mpmath  # for those who need it
-
-        numbers = np.empty(self.y.shape, dtype=object)
-        with mpmath.workprec(EXACT_BITS):
-            for place in np.ndindex(self.y.shape):
-                high, low = self.pairs[place].tolist()
-                numbers[place] = mpmath.mpf(high) + low
-        return numbers
+        return as_mpmath(self.pairs)
 
     def guards(self) -> dict[str, Array]:
         """Return the quantities that a symmetry keeps at exactly zero, by name."""
@@ -526,6 +519,18 @@ class Solution:
             Path(path),
             lambda file: np.savez(file, **arrays),  # pyright: ignore[reportArgumentType]
         )
+
+
+def as_mpmath(pairs: Array) -> NDArray[Any]:
+    """Return pairs, shape (..., 2), as numbers of mpmath, exactly."""
+    import mpmath  # for those who need it
+
+    numbers = np.empty(pairs.shape[:-1], dtype=object)
+    with mpmath.workprec(EXACT_BITS):
+        for place in np.ndindex(numbers.shape):
+            high, low = pairs[place].tolist()
+            numbers[place] = mpmath.mpf(high) + low
+    return numbers
 
 
 _AS_THEY_ARE = ("reason", "t_stop", "compile_seconds", "from_cache")

@@ -1,5 +1,6 @@
 """Gauss with fixed steps in double-double arithmetic: a program, and its trajectories."""
 
+from contextlib import suppress
 from time import perf_counter
 from typing import Any
 
@@ -141,12 +142,28 @@ class DoubleDoubleStepper(RestorableStepper):
         self._served = []
         samples = super().advance(times, sample=sample)
         rows = self._served
-        if rows:
+        if rows and not self._status.failed:
             self._present = complex(float(samples.t[-1])), rows[-1]
         if samples.t.size > len(rows):  # the first of the times is the present
             rows = [present, *rows]
         self.low = np.array([row.imag for row in rows]).reshape(samples.y.shape)
         return samples
+
+    @property
+    @one_thread
+    def pairs(self) -> Array:
+        """The state at exactly the present time ``t``, in pairs, shape (dim, 2).
+
+        A step may end at a time that is no double, a rounding error away.
+        """
+        t, y = self._present
+        if t.imag:
+            y, program = y.copy(), self._program
+            with suppress(
+                ArithmeticError, ValueError
+            ):  # the field is not defined here, and ends the next step
+                program.march(t, 0, 1, complex(-t.imag), y, self._par, *program.tables, _counts())
+        return np.stack([y.real, y.imag], axis=1)
 
     def _time(self, n: int) -> complex:
         return plus(self._base, product(float(n), self._h))
@@ -213,7 +230,8 @@ class DoubleDoubleStepper(RestorableStepper):
         self._stats.steps += taken if own else 0
         if not ended:
             return True
-        here, size = plus(t, times(complex(float(first + taken)), step)).real, abs(self._h)
+        self._present = plus(t, times(complex(float(first + taken)), step)), y.copy()
+        here, size = self._present[0].real, abs(self._h)
         if ended == UNSOLVED:
             self._fail(
                 Status.NONLINEAR_DIVERGENCE, here,

@@ -28,9 +28,36 @@ def pairs(start: Any, problem: Problem) -> Array:
     problems.errors.InputError
         For anything else, and where the problem does not start at the nearest doubles.
     """
-    dim = problem.system.dim
+    rows = as_pairs(start, problem.system.dim)
+    high = rows[:, 0]
+    if (different := np.flatnonzero(high != problem.y0)).size:
+        i = int(different[0])
+        raise InputError(
+            f"start[{i}] rounds to {float(high[i])!r}, but the problem starts at {float(problem.y0[i])!r}; "
+            "make the problem with the same numbers."
+        )
+    return rows
+
+
+def as_pairs(state: Any, dim: int, *, label: str = "start") -> Array:
+    """Return a state as pairs, shape (dim, 2).
+
+    Parameters
+    ----------
+    state : array_like
+        Numbers of mpmath, or doubles, (dim,); or pairs of doubles, (dim, 2).
+    dim : int
+        How many components it has.
+    label : str
+        What it is called, for a message.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For anything else.
+    """
     try:
-        numbers: NDArray[Any] = np.array(start, dtype=object)
+        numbers: NDArray[Any] = np.array(state, dtype=object)
         if numbers.shape == (dim, 2):
             high, low = two_sum(*numbers.astype(np.float64).T)
         else:
@@ -40,14 +67,8 @@ def pairs(start: Any, problem: Problem) -> Array:
         high, low = np.empty(0), np.empty(0)
     if high.shape != (dim,) or not np.isfinite(high + low).all():
         raise InputError(
-            f"start must be {dim} finite numbers, of mpmath or doubles, or {dim} pairs of doubles, "
-            f"not {shown(start)}."
-        )
-    if (different := np.flatnonzero(high != problem.y0)).size:
-        i = int(different[0])
-        raise InputError(
-            f"start[{i}] rounds to {float(high[i])!r}, but the problem starts at {float(problem.y0[i])!r}; "
-            "make the problem with the same numbers."
+            f"{label} must be {dim} finite numbers, of mpmath or doubles, or {dim} pairs of doubles, "
+            f"not {shown(state)}."
         )
     return np.stack([high, low], axis=1)
 

@@ -2,17 +2,18 @@
 
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from integrators import registry
 from integrators.events.event import Event
-from integrators.protocol import Array, Destination, MethodBase, Status, check_problem, offers
+from integrators.protocol import Array, Destination, DoubleDouble, MethodBase, Status, check_problem, offers
 from integrators.refusals import check_parameters, check_state, check_times
+from integrators.running.digits import as_pairs, check_digits, pairs
 from integrators.running.integrate import prepared, started, wanted_events
-from integrators.solution import Occurrences
+from integrators.solution import Occurrences, as_mpmath
 from problems.analysis import invariants
 from problems.checks import checked_arguments
 from problems.errors import InputError
@@ -24,6 +25,8 @@ def start(
     problem: Problem,
     method: MethodBase | None = None,
     events: Event | Callable[..., Any] | Sequence[Event | Callable[..., Any]] = (),
+    *,
+    start: Any = None,
 ) -> "Run":
     """Return a trajectory at the problem's start, which is then taken step by step.
 
@@ -35,6 +38,8 @@ def start(
         How; ``HBVM()`` by default.
     events : Event or callable, or a sequence of them, optional
         What to look for in the steps; see `integrators.events.Event`.
+    start : array_like, shape (dim,) or (dim, 2), optional
+        The problem's start with more digits than doubles have; see `integrate`.
 
     Returns
     -------
@@ -59,7 +64,7 @@ def start(
     if method is None:
         method = registry.create("HBVM")
     check_problem(problem, method)
-    return Run(problem, method, events)
+    return Run(problem, method, events, start)
 
 
 class Run:
@@ -84,16 +89,24 @@ class Run:
     (<Status.RUNNING: 'running'>, True)
     """
 
-    def __init__(self, problem: Problem, method: MethodBase, events: Any) -> None:
+    def __init__(self, problem: Problem, method: MethodBase, events: Any, start: Any = None) -> None:
         self.problem, self.method = problem, method
         self._program, _ = prepared(method, problem.system)
         self._wanted = wanted_events(events, None)
         self._par = problem.par
         self._before: list[Mapping[str, Occurrences]] = []
         self._shown: tuple[float, Array] | None = None
-        self._begin(problem.y0, problem.t0)
+        digits = start is not None or method.precision != "double"
+        if digits:
+            check_digits(method, events=bool(self._wanted), variations=False)
+        begin = pairs(problem.y0 if start is None else start, problem) if digits else problem.y0
+        self._begin(begin, problem.t0)
 
     def _begin(self, y: Array, t: float) -> None:
+        """Begin at a state, or at its pairs."""
+        if y.ndim == 2:
+            self._stepper = cast("DoubleDouble", self._program).start_pairs(y, self._par, t)
+            return
         last = self.problem.t_end
         end = sys.float_info.max if last >= self.problem.t0 else -sys.float_info.max
         self._stepper = started(self._program, self.method, self.problem, self._wanted, y, self._par, t, end)
@@ -121,7 +134,49 @@ class Run:
 
     @y.setter
     def y(self, state: ArrayLike) -> None:
-        self._anew(check_state(state, self.problem.system.dim))
+        values = check_state(state, self.problem.system.dim)
+        self._anew(values if self.method.precision == "double" else as_pairs(values, values.size))
+
+    @property
+    def pairs(self) -> Array:
+        """The present state with twice the digits of a double, shape (dim, 2), at exactly the time ``t``.
+
+        It can be set, as pairs or as numbers of mpmath, for ``Gauss(..., precision="double-double")``. A step
+        may end a rounding error of ``t`` away, so the last bits of ``y`` may be others.
+
+        Raises
+        ------
+        problems.errors.InputError
+            For a method that calculates with doubles.
+
+        Examples
+        --------
+        >>> import problems
+        >>> from integrators import Gauss, start
+        >>> run = start(problems.load("kepler"), Gauss(s=12, h=0.05, precision="double-double"))
+        >>> run.until(1.0).shape, run.pairs.shape, run.to_mpmath().shape
+        ((4,), (4, 2), (4,))
+        """
+        self._check_digits()
+        return _frozen(self._stepper.pairs)
+
+    @pairs.setter
+    def pairs(self, state: Any) -> None:
+        self._check_digits()
+        self._anew(as_pairs(state, self.problem.system.dim, label="pairs"))
+
+    def to_mpmath(self) -> NDArray[Any]:
+        """Return the present state as numbers of mpmath, exactly; shape (dim,).
+
+        Raises
+        ------
+        problems.errors.InputError
+            For a method that calculates with doubles.
+        """
+        return as_mpmath(self.pairs)
+
+    def _check_digits(self) -> None:
+        check_digits(self.method, events=False, variations=False)
 
     @property
     def par(self) -> Array:
@@ -135,7 +190,7 @@ class Run:
             known: dict[str, Any] = {**system.unpack(self._par), **values}
             values = system.pack(known)
         self._par = check_parameters(values, system)
-        self._anew(self.y)
+        self._anew(self.y if self.method.precision == "double" else self.pairs)
 
     @property
     def status(self) -> Status:
