@@ -19,7 +19,7 @@ from problems.problem import Problem
 
 LONG = 128.0  # binary logarithm of a growth in a chunk after which the next one is shorter,
 SHORT = 16.0  # and longer
-ROOM = 1 << 23  # bytes of the vectors of a chunk of steps, at most
+ROOM = 1 << 21  # bytes of the vectors of a chunk of steps, at most
 FINENESS = 16  # at the beginning, times between samples are this part of the time since the start,
 FIRST = 1e-3  # and the first sample comes after this part of the distance that they have later
 
