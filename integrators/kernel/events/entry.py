@@ -42,7 +42,7 @@ DEEPEST = 8  # times that a step is halved where samples do not resolve a functi
 ISOLATED = 16  # changes of sign in a part that is not resolved: a pole, a jump or a corner makes fewer
 LOST = 4.0  # times the rounding of one state: what many steps leave of a g that vanishes all along
 SHORTEST = 1e-6  # of a step is more than a unit in the last place of time: else there is no place inside
-SAME = 1e-5  # of a step: two touches as close are one
+SAME = 1e-5  # of a step: a touch as close to another zero is none of its own
 ULP = 2.0**-52
 
 searching = view(Search)
@@ -298,11 +298,11 @@ def note(ctx, search, x, direction):
     """Note a zero, unless it is in another direction than wanted; return whether there was room."""
     event = search.event
     t = time_at(search, x)
-    if direction == 0:  # a touch at the end of a step is seen from both sides
-        again = abs(t - search.touched[event]) < SAME * abs(search.stop - search.time)
-        search.touched[event] = t
-        if again:
-            return True
+    # A touch at the end of a step is seen from both sides, and so may be a crossing by its own rounding.
+    again = abs(t - search.touched[event]) < SAME * abs(search.stop - search.time)
+    search.touched[event] = t
+    if direction == 0 and again:
+        return True
     if search.directions[event] != 0 and search.directions[event] != direction:
         return True
     i = search.hits

@@ -45,7 +45,7 @@ class Search(Memory):
 
     # --- what lasts from step to step ---
     ends = Array("count")  # values of the functions at the present state
-    touched = Array("count")  # when each was last seen to touch zero
+    touched = Array("count")  # when each was last seen to be zero
     finite = Array("count", kind=int)  # 1: the function was finite somewhere
     happened = Array("count", kind=int)
     known = Real()  # the time up to which all is known

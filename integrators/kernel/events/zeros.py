@@ -5,7 +5,7 @@ states at the ends of partial steps say where they are.
 """
 
 from integrators.kernel.events.chebyshev import NEAR
-from integrators.kernel.events.memory import TINY
+from integrators.kernel.events.memory import FINEST, TINY
 from integrators.kernel.events.sample import is_finite, sign
 from integrators.kernel.events.solve import (
     APART,
@@ -118,6 +118,23 @@ def extremum_around(ctx, search, i, j, way):
     return extremum(ctx, search, search.places[max(i - 1, 0)], search.places[min(j + 1, search.n - 1)], way)
 
 
+BEYOND = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)  # of the stretch: how far beyond its end g may have a sign again
+
+
+@compiled
+def direction_at_end(ctx, search, before):
+    """Return the direction of a zero at the very end: by the sign of the function just beyond it."""
+    raised, after = search.raised, 0
+    for distance in BEYOND:
+        x = 1.0 + max(distance, 100.0 * search.resolution)
+        value = value_at(ctx, search, x)
+        if abs(value) > noise_at(ctx, search, x):
+            after = sign(value)
+            break
+    search.raised = raised  # a function may go no farther than the integration
+    return 0 if after == before else -before
+
+
 @compiled
 def mark_low(ctx, search, low, way):
     """Note what the function does where the polynomial, of sign ``way``, comes near zero and turns back."""
@@ -139,7 +156,13 @@ def mark_low(ctx, search, low, way):
     if sign(value) == -way and abs(value) > noise:
         mark(search, x, -way)
     elif abs(value) <= noise or abs(value) <= blur(ctx, search, x):
-        add_zero(search, x, 0)
+        direction = 0
+        if low == search.n - 1 and x >= 1.0 - BESIDE:
+            direction = direction_at_end(ctx, search, way)
+        add_zero(search, x, direction)
+        if direction != 0:  # what follows begins beyond the zero: rounding decided on the sign here
+            search.end_value = TINY * direction
+            search.sampled[FINEST * search.event + search.degree - 1] = search.end_value
 
 
 @compiled
@@ -170,23 +193,6 @@ def mark_run(ctx, search, first, last):
                 mark(search, x, sign(value))
         if i < count:
             mark_low(ctx, search, search.lows[i], way)
-
-
-BEYOND = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)  # of the stretch: how far beyond its end g may have a sign again
-
-
-@compiled
-def direction_at_end(ctx, search, before):
-    """Return the direction of a zero at the very end: by the sign of the function just beyond it."""
-    raised, after = search.raised, 0
-    for distance in BEYOND:
-        x = 1.0 + max(distance, 100.0 * search.resolution)
-        value = value_at(ctx, search, x)
-        if abs(value) > noise_at(ctx, search, x):
-            after = sign(value)
-            break
-    search.raised = raised  # a function may go no farther than the integration
-    return 0 if after == before else -before
 
 
 @compiled
