@@ -67,7 +67,9 @@ def warnings(
     """
     kinks, implicit = extra.get("kinks"), extra.get("implicit")
     if caveat is None and not kinks and implicit and implicit["steps"]:
-        caveat = unseen_in_time(problem, f"kinks are not looked for in its {implicit['steps']} Newton steps")
+        caveat = unseen_in_time(
+            problem, f"discontinuities are not detected in its {implicit['steps']} Newton steps"
+        )
     said = () if caveat is None else (caveat,)
     if 0.0 < (size := float(np.abs(start).max(initial=0.0))) < TINY:
         said += (
@@ -86,8 +88,9 @@ def warnings(
     place = f"between t = {t!r} and {t + h!r}" if h else f"at t = {t!r}"
     return (
         *said,
-        f"the field jumps or has a kink (places kept: {len(kinks)}, the first {place}): steps "
-        "were cut there, and what lies between two nodes may have been missed; give breakpoints where the "
+        "the right-hand side or its derivative is discontinuous "
+        f"(places recorded: {len(kinks)}, the first {place}): steps were "
+        "cut there, and what lies between two nodes may have been missed; give breakpoints where the "
         "times are known.",
     )
 
@@ -176,7 +179,7 @@ def unseen(problem: Problem, why: str | None) -> str | None:
     if why is None or not problem.system.traced or not has_kinks(problem.system):
         return None
     return (
-        f"its field has m.abs, m.round or m.where, and {why}: steps go over a kink with any error, "
+        f"its field has m.abs, m.round or m.where, and {why}: steps go over a discontinuity with any error, "
         "and the run ends as finished."
     )
 
@@ -205,7 +208,7 @@ def unknown_kinks(
     if problem.system.traced or tol is None or k is None or k >= ENOUGH or breakpoints:
         return None
     return (
-        f"its field is a function that is not traced, in which k={k} nodes do not tell a jump or a kink from "
+        f"its field is a function that is not traced, in which k={k} nodes do not tell a discontinuity from "
         f"a smooth change: if it has some, give breakpoints or k >= {ENOUGH}."
     )
 
@@ -218,7 +221,7 @@ def blind(k: int | None, tol: float | None, solver: str) -> str | None:
     if tol is None:
         return "fixed steps are not cut there"
     if solver in ("newton", "blended"):
-        return f"kinks are not looked for with solver={solver!r}"
+        return f"discontinuities are not detected with solver={solver!r}"
     if k is not None and k < FEWEST:
-        return f"k={k} nodes do not tell a kink from a smooth field"
+        return f"k={k} nodes do not tell a discontinuity from a smooth field"
     return None

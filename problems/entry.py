@@ -125,7 +125,7 @@ def entry(
             problem = make(**call)  # type: ignore[call-arg]
             if not isinstance(problem, Problem):
                 raise InputError(f"{name} must return a problems.Problem, not {shown(problem)}.")
-            return problem.entitled(
+            return problem.with_metadata(
                 name=name,
                 title=words.title or problem.title,
                 arguments=taken.printed(call, words.shows),

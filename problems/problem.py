@@ -125,7 +125,7 @@ class Problem:
         for key, value in values.items():
             object.__setattr__(self, key, value)
 
-    def entitled(
+    def with_metadata(
         self, *, name: str, title: str, arguments: Mapping[str, Any], references: Sequence[str], notes: str
     ) -> Self:
         """Return the same problem under a name: what it prints as, and what reports say of it."""

@@ -57,7 +57,7 @@ class TimingPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     order : {"shuffled", "alternating"}
         Of interleaved rounds: anew in each, or every other one backwards.
     clock : {"wall", "thread", "process"}
-        Of interleaved times: of the wall, or of the processor's time for this thread, or for all threads
+        Of interleaved times: of the wall, or CPU time of this thread, or for all threads
         of this process, in which other work on the machine does not count.
     compilations : int
         Of interleaved times: fresh processes with empty caches among which the rounds are shared, for one

@@ -302,7 +302,7 @@ def _one_sentence(path: Path, start: str) -> Iterator[None]:
 
 def _titled(problem: Problem, name: str, arguments: Mapping[str, Any]) -> Problem:
     """Return a problem under the name by which a command line or a campaign has it."""
-    return problem.entitled(
+    return problem.with_metadata(
         name=name,
         title=name.rpartition(":")[2] if problem.title == problem.system.name else problem.title,
         arguments=arguments,

@@ -19,13 +19,13 @@ MEASURED = ("vector_bits", "clock_ghz")
 
 # What `kind` says, for under a table; then what the option --avx2 does.
 COLUMNS = (
-    "Columns: LLVM's name of the processor and how wide its arithmetic is, where that was measured; -avx2: "
-    "all that numba compiles, which is our code and the forces and fields handed to REBOUND and SciPy, "
+    "Columns: LLVM's name of the processor and the width of its vector arithmetic, where measured; -avx2: "
+    "all that numba compiles (HBVM, Gauss, the forces and right-hand sides handed to REBOUND and SciPy) "
     "without AVX-512."
 )
 AVX2 = (
-    "Without AVX-512 in all that numba compiles: our code, and the forces and fields handed to REBOUND "
-    "and SciPy."
+    "Without AVX-512 in all that numba compiles: HBVM, Gauss, and the forces and right-hand sides handed to "
+    "REBOUND and SciPy."
 )
 BINDS = hasattr(psutil.Process, "cpu_affinity")  # to cores: Linux and Windows do
 FEATURES, NAME = "NUMBA_CPU_FEATURES", "NUMBA_CPU_NAME"
@@ -83,10 +83,11 @@ def sentence(described: Mapping[str, str | int]) -> str:
     known = (("family", "{}"), ("llvm_processor", "LLVM: {}"))
     names = [words.format(described[key]) for key, words in known if key in described]
     bits, clock = described.get("vector_bits"), described.get("clock_ghz")
-    width = f"arithmetic {bits} bits wide" if bits else "width of the arithmetic not recorded"
+    width = f"{bits}-bit vector arithmetic" if bits else "width of the arithmetic not recorded"
     restricted = (
-        "; all that numba compiles, our code and the forces and fields handed to REBOUND and SciPy, "
-        f"was restricted to {described.get('ours_built_for')}, the code of the other libraries was not"
+        "; all that numba compiles (HBVM, Gauss, and the forces and right-hand sides handed to REBOUND "
+        f"and SciPy) was restricted to {described.get('ours_built_for')}, "
+        "the code of the other libraries was not"
     )
     return (
         f"Times and their ratios belong to this kind of processor: {described.get('processor', 'unknown')}"
@@ -114,7 +115,7 @@ def sentences(described: Iterable[Mapping[str, str | int]]) -> list[str]:
 
 
 def restricted_to_avx2() -> dict[str, str]:
-    """Return the environment in which our code, and all else that numba compiles, does without AVX-512.
+    """Return the environment in which numba compiles without AVX-512.
 
     Libraries with compilers of their own (heyoka, JAX) or compiled code (REBOUND, SciPy) do not
     look at it. Only a process that starts with it is restricted.

@@ -135,7 +135,7 @@ class Load(msgspec.Struct, frozen=True, kw_only=True):
     others : float
         Other processes of this machine, over all cores.
     stolen : float
-        Time that the machine's host kept to itself.
+        Steal time: CPU time that the machine's host gave to others.
     """
 
     others: float

@@ -148,8 +148,8 @@ def beside(records: Sequence[Record]) -> list[str]:
     others, stolen = (_shares([getattr(load, name) for load in loads]) for name in ("others", "stolen"))
     doubt = "; the times are doubtful" if busy(records) else ""
     return [
-        f"While times were taken, other processes used {others} of a core, and the host kept {stolen} of "
-        f"one{doubt}."
+        f"While times were taken, other processes used {others} of a core, and the steal time was "
+        f"{stolen} of one{doubt}."
     ]
 
 

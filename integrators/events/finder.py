@@ -13,7 +13,7 @@ from integrators.solution import Occurrences
 from problems.errors import InputError
 from problems.problem import Problem
 
-Trouble = tuple[Status, str, Exception | None]
+Failure = tuple[Status, str, Exception | None]
 
 
 class Hits:
@@ -113,7 +113,7 @@ class Finder(Protocol):
         Why nothing is looked for any more: status, reason, and what a function of the user raised.
     """
 
-    trouble: Trouble | None
+    trouble: Failure | None
 
     @property
     def hits(self) -> Hits:

@@ -107,7 +107,7 @@ def exact_k(nu: int, s: int) -> int:
 
 
 def operations(function: Function) -> int:
-    """Count the operations of a function that differ from stage to stage, dear ones as several."""
+    """Count the operations of a function that differ from stage to stage, expensive ones as several."""
     count = sum(len(terms) for terms in function.outputs)
     for node in reachable(function.roots):
         if node.flags & (STATE | T):

@@ -118,9 +118,10 @@ class HBVM(MethodBase):
         Length that no step exceeds, > 0, in units of time; with ``tol``. For a field with pulses or
         bumps that are shorter than the steps the estimate allows.
     breakpoints : sequence of float, optional
-        Times at which the field jumps or has a kink, in any order; with ``tol``. A step ends at each
-        of them that is passed, and nothing from before it is used after it. The times at which formulas
-        switch need not be given where they follow from conditions and tables of anything affine in the time,
+        Times at which the right-hand side or its derivative is discontinuous, in any order; with
+        ``tol``. A step ends at each of them that is passed, and nothing from before it is used after it.
+        The times at which formulas switch need not be given where they follow from conditions and
+        tables of anything affine in the time,
         such as ``m.where(t < par.c, ...)``, ``m.abs(2*t - 3)`` and ``m.table(t/par.T, ...)``.
     max_steps : int, optional
         Steps of a trajectory from its start, at most; with ``tol``. A run that needs more ends
@@ -229,7 +230,9 @@ class HBVM(MethodBase):
     def caveat(self, problem: Problem) -> str | None:
         """Name a field with kinks that these options do not look for; see the class."""
         poisson = problem.system.kind == "poisson"
-        why = "the steps that keep a Poisson system's energy do not look for kinks" if poisson else None
+        why = (
+            "the steps that keep a Poisson system's energy do not detect discontinuities" if poisson else None
+        )
         why = why or blind(self.k, self.tol, self.solver)
         kinks = unseen(problem, why) if poisson or self.tol is None else unseen_in_time(problem, why)
         return kinks or unknown_kinks(problem, self.k, self.tol, self.breakpoints)

@@ -166,7 +166,7 @@ class LineIntegral(MethodBase):
 
     def caveat(self, problem: Problem) -> str | None:
         """Name a field with kinks: they are not looked for."""
-        return unseen(problem, "line integral methods do not look for kinks")
+        return unseen(problem, "line integral methods do not detect discontinuities")
 
     def conserved(self, system: System) -> dict[str, float]:
         """Return the invariants that are kept, with a tolerance."""

@@ -158,7 +158,7 @@ def test_a_jump_of_the_force_is_found_and_named(method, most):
     crossings = math.sqrt(2.0) * np.arange(1, 15, 2)
     assert min(np.abs(crossings - t).min() for t, _ in kinks) < 1e-2
     (warning,) = solution.warnings
-    sentence(warning, "the field jumps or has a kink .* give breakpoints")
+    sentence(warning, "the right-hand side or its derivative is discontinuous .* give breakpoints")
 
 
 def test_the_places_of_kinks_are_kept_the_first_first_and_go_with_a_checkpoint():
@@ -230,7 +230,7 @@ def test_smooth_fields_have_no_kinks(method):
     ("method", "why"),
     [
         (HBVM(k=4, s=2, h=0.1), "fixed steps are not cut there"),
-        (LineIntegral(k=8, s=4, tol=1e-10, invariants=["energy"]), "do not look for kinks"),  # 2e-3
+        (LineIntegral(k=8, s=4, tol=1e-10, invariants=["energy"]), "do not detect discontinuities"),  # 2e-3
     ],
     ids=repr,
 )
@@ -265,7 +265,7 @@ def test_newton_steps_say_that_they_do_not_look_for_kinks_in_time():
     solution = integrators.integrate(problem, HBVM(k=8, s=4, tol=1e-6), [20.0])
     assert solution.stats.extra["implicit"]["steps"] > 0
     (warning,) = solution.warnings
-    sentence(warning, r"not looked for in its \d+ Newton steps")
+    sentence(warning, r"not detected in its \d+ Newton steps")
 
 
 @pytest.mark.parametrize("method", [Gauss(s=4, tol=1e-10, solver="newton"), Gauss(s=3, tol=1e-8)], ids=repr)
@@ -278,7 +278,9 @@ def test_a_formula_tells_where_it_switches_whatever_the_solver(method):
     expected = [-reached * since + since * since / 2.0, since - reached]
     assert np.abs(solution.y[-1] - expected).max() < 1e-7
     assert len(solution.warnings) == 1
-    sentence(solution.warnings[0], "the field jumps or has a kink .* give breakpoints")
+    sentence(
+        solution.warnings[0], "the right-hand side or its derivative is discontinuous .* give breakpoints"
+    )
 
 
 def test_heyoka_says_that_it_does_not_see_a_kink():

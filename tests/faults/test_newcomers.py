@@ -54,7 +54,9 @@ def test_a_large_problem_prints_short(name: str | None) -> None:
     problem = problems.load("cluster", n=300)
     large = problems.Problem(problem.system, y0=problem.y0, t_end=1.0)
     if name is not None:
-        large = large.entitled(name=name, title="", arguments={"y0": [0.1] * 900}, references=(), notes="")
+        large = large.with_metadata(
+            name=name, title="", arguments={"y0": [0.1] * 900}, references=(), notes=""
+        )
     assert len(repr(large)) > 4000
     assert len(str(large)) < 420
     assert "in all]" in str(large)

@@ -30,7 +30,7 @@ BLOWN = 1e3  # relative error of H of a run that has no meaning
 # Limits of the verdicts, each with what was measured.
 ALIKE = 0.05  # of the amplitude: two motions that differ by less look the same in a figure; 0.30
 IN_BOUNDS = 1.02  # of the true amplitude; 1.003
-ROUND_OFF = 1e-12  # Gauss's angular momentum 1.9e-15; the primaries' plane 3.7e-3, in truth 3.8e-3
+ROUND_OFF = 1e-12  # Gauss's angular momentum 1.9e-15; the primaries' plane 3.7e-3, reference 3.8e-3
 WITH_THE_ORDER = 10.0  # times as much turning at h = 1/2 as at 1/8; 202
 CRITICAL = 0.725  # the paper's critical eccentricity
 
@@ -110,7 +110,7 @@ def trajectories(runs: Mapping[str, Orbit], times: Sequence[float | None]) -> li
         Claim(
             "Under HBVM(18,2) it oscillates in bounds, very much like the exact solution",
             "Figure 3, on [0, 350]",
-            f"|z| ≤ {np.abs(hbvm.z).max():.4f} to t = 1500, in truth {np.abs(truth.z).max():.4f}. "
+            f"|z| ≤ {np.abs(hbvm.z).max():.4f} to t = 1500, reference {np.abs(truth.z).max():.4f}. "
             f"{'z itself' if like == 'holds' else 'But z itself'} is off by up to {early:.2f} on [0, 350] "
             f"and by {apart[-1]:.2f} at t = 1500",
             like,
@@ -119,7 +119,7 @@ def trajectories(runs: Mapping[str, Orbit], times: Sequence[float | None]) -> li
             "HBVM preserves the apocentre distance of the primaries, Gauss does not",
             "Figure 4",
             f"HBVM {spans['hbvm'][0]:.4f} … {spans['hbvm'][1]:.4f}, Gauss {spans['gauss'][0]:.2f} … "
-            f"{spans['gauss'][1]:.2f}; in truth 5",
+            f"{spans['gauss'][1]:.2f}; reference 5",
             "holds" if np.ptp(spans["hbvm"]) < 0.02 < np.ptp(spans["gauss"]) else "no",
         ),
         Claim(

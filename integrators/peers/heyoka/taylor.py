@@ -107,7 +107,9 @@ class Taylor(MethodBase):
 
     def caveat(self, problem: Problem) -> str | None:
         """Name a field that is not smooth: heyoka differentiates ``abs`` as if no step went over its kink."""
-        return unseen(problem, "a Taylor series from one side of a kink knows nothing of the other")
+        return unseen(
+            problem, "a Taylor series on one side of a discontinuity does not describe the other side"
+        )
 
     def compile(self, system: System) -> "TaylorProgram":
         """Have heyoka compile the integrator for ``system``."""

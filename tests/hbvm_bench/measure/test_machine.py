@@ -1,4 +1,4 @@
-"""What kind of processor times belong to, and our code restricted to another kind."""
+"""What kind of processor times belong to, and numba's code restricted to another kind."""
 
 import os
 import re
@@ -43,7 +43,7 @@ def test_this_machine_has_a_kind_with_measured_width_and_clock():
     assert here["vector_bits"] in (64, 128, 256, 512)
     assert 0.5 < float(here["clock_ghz"]) < 10.0
     said = machine.sentence(here)
-    for part in ("LLVM: ", "family", "bits wide", "GHz", str(here["llvm_processor"])):
+    for part in ("LLVM: ", "family", "-bit vector arithmetic", "GHz", str(here["llvm_processor"])):
         assert part in said
 
 
@@ -62,10 +62,10 @@ def test_an_instruction_that_takes_two_of_half_the_width_is_not_taken_whole(time
 def test_what_was_not_recorded_is_said_and_not_guessed():
     assert "width of the arithmetic not recorded" in machine.sentence(ZEN5)
     assert "znver5" in machine.sentence(ZEN5)
-    assert "arithmetic 256 bits wide, 3.7 GHz." in machine.sentence(ZEN4)
+    assert "256-bit vector arithmetic, 3.7 GHz." in machine.sentence(ZEN4)
     restricted = machine.sentence(ZEN4 | {"ours_built_for": "AVX2"})
     assert (
-        "handed to REBOUND and SciPy, was restricted to AVX2, the code of the other libraries was not"
+        "handed to REBOUND and SciPy) was restricted to AVX2, the code of the other libraries was not"
         in restricted
     )
     assert "not recorded" in machine.sentence({})
@@ -163,7 +163,7 @@ def test_results_of_several_kinds_lie_side_by_side(tmp_path):
         "| `kepler(e=0.6, t_end=3150.0)` | `Taylor(tol=1e-15)` | ≥ 2 | 2.00× reached | 3.00× reached" in page
     )
     assert re.search(r"`henon_heiles\(.*\)` \| .* \| not run", page)
-    assert "256 bits wide" in page
+    assert "256-bit vector arithmetic" in page
     archived(tmp_path, msgspec.structs.replace(of(ZEN5), index=made_up().run.index))
     with pytest.raises(InputError, match="has results of 'race'"):
         keep(of(ZEN4), tmp_path)

@@ -20,7 +20,7 @@ def departure(
 
     A trajectory that its method can follow no farther, as in a blow-up, has departed with its last state.
     A stretch of time is integrated without looking, the next ones are longer; then states ``every`` so far
-    apart are looked at, by default all steps of the method, which costs some libraries dear.
+    apart are looked at, by default all steps of the method, which is expensive for some libraries.
     """
     longest = stretch * LONGEST
     ahead = stepper.t
