@@ -41,6 +41,9 @@ RETIRED = {
     "right to 1e-": "position error ≤",
     "fixed computation": "calibration loop",
     "stolen time": "steal time",
+    "the host kept": "steal time",
+    "bits wide": "n-bit vector arithmetic",
+    "in truth": "reference solution",
     "what is left of a change": "residual of the iteration",
     "everything, for programs": "JSON output",
 }

@@ -87,7 +87,7 @@ class TestAtAnyTime:
         assert solution(t).shape == (2, 2, 4)
         assert np.abs(solution(t) - exact).max() < bound
 
-    def test_energy_is_kept_between_samples(self, henon_heiles):
+    def test_energy_is_conserved_between_samples(self, henon_heiles):
         solution = integrate(henon_heiles, HBVM(k=6, s=4, h=0.25), times=np.linspace(0.0, 50.0, 6))
         between = solution(np.random.default_rng(1).uniform(0.0, 50.0, 40))
         # Measured 1.9e-16; the polynomial of the step leaves 2.4e-7.

@@ -130,7 +130,7 @@ def test_a_trajectory_is_the_same_bits_alone_in_any_place_and_on_any_threads(nam
             assert part.iterations.tolist() == whole.iterations[order].tolist()
 
 
-def test_energy_is_kept_as_by_integrate():
+def test_energy_is_conserved_as_by_integrate():
     problem = problems.load("henon_heiles", energy=0.125, q2=0.1)
     program = HBVMProgram(problem.system, k=8, s=8, h=0.5)
     starts = problem.y0 * (1 + 0.01 * rng.normal(size=(8, 4)))

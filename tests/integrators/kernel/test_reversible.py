@@ -80,7 +80,7 @@ def test_checkpoints_and_samples_leave_the_steps_alone():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("e", [0.9, 0.99])
-def test_over_1e5_revolutions_the_energy_makes_a_random_walk(e):
+def test_over_1e5_revolutions_the_energy_error_is_a_random_walk(e):
     problem = problems.load("kepler", e=e)
     _, y = run(problem, Gauss(s=8, tol=1e-12, steps="reversible"), 100_000, 4000)
     errors = problem.errors(y)

@@ -113,7 +113,7 @@ def test_steps_start_with_the_present_only_if_asked_for():
     assert np.array_equal(stepper.advance([1.25, 0.9], sample="steps").t, [1.25, 1.0])
 
 
-def test_landing_changes_the_steps_and_says_where_it_is():
+def test_stopping_at_output_times_changes_the_steps_and_says_where_it_is():
     problem, method = testing.pendulum(), HBVM(k=6, s=3, h=0.25)
     stepper = start(problem, method)
     stepper.advance([0.6, 0.7], sample="stop")

@@ -91,7 +91,7 @@ def test_a_sample_is_what_a_partial_step_gives():
     assert np.max(np.abs(sample - ta.state)) <= 2.3e-16  # 0
 
 
-def test_landing_and_side_agree_and_landing_takes_more_steps():
+def test_stops_and_partial_steps_agree_and_stops_take_more_steps():
     problem = testing.two_bodies()
     grid = np.linspace(0.0, 15.0, 301)
     side, land = (integrate(problem, Taylor(), grid, sample=how) for how in ("partial", "stop"))
@@ -149,7 +149,7 @@ def test_a_start_that_takes_over_an_integrator_is_a_start_anew():
     assert again.stats == fresh.stats
 
 
-def test_one_time_is_landed_on_as_several_are():
+def test_a_step_stops_at_one_time_as_at_several():
     problem = problems.load("kepler", e=0.6, t_end=30.0)
     program = Taylor().compile(problem.system)
     one, same = (program.start(problem.y0, problem.par) for _ in range(2))

@@ -240,7 +240,7 @@ def test_the_energy_is_at_rounding_at_any_tolerance(name, options, tol):
     assert solution.errors()["energy"].max() < 2e-14
 
 
-def test_a_polynomial_energy_is_kept_at_any_tolerance():
+def test_a_polynomial_energy_is_conserved_at_any_tolerance():
     problem = problems.load("henon_heiles", t_end=1000.0)
     for tol in (1e-3, 1e-6):
         solution = integrators.integrate(problem, HBVM(tol=tol), sample="steps")

@@ -128,7 +128,7 @@ def test_a_batch_of_ten_thousand_pendulums_equals_the_loop() -> None:
         assert np.abs(batch[i] - alone).max() < 1e-13  # measured 1e-15: XLA rounds batches otherwise
 
 
-def test_a_controller_chooses_steps_and_the_energy_is_kept_with_them() -> None:
+def test_a_controller_chooses_steps_and_the_energy_is_conserved_with_them() -> None:
     solution = dx.diffeqsolve(
         dx.ODETerm(field), HBVM(k=12, s=4), 0.0, 30.0, None, jnp.array([0.0, 1.9]), args=1.0,
         stepsize_controller=dx.PIDController(rtol=1e-6, atol=1e-6), saveat=dx.SaveAt(steps=True),

@@ -45,7 +45,7 @@ def state(simulation: Any) -> np.ndarray:
 
 
 @pytest.mark.parametrize("method", [Gauss(s=8, h=H), HBVM(k=10, s=8, h=H)])
-def test_energy_and_angular_momentum_are_kept_as_in_the_native_kernel(method: Any) -> None:
+def test_energy_and_angular_momentum_are_conserved_as_in_the_native_kernel(method: Any) -> None:
     simulation = planets()
     masses = np.array([body.m for body in simulation.particles])
 
