@@ -196,7 +196,7 @@ def test_the_goals_of_a_campaign_stand_in_its_report(tmp_path, undrawn):
     assert [row.split(" | ")[-1] for row in rows] == ["reached |", "missed |"]
 
 
-@pytest.mark.parametrize("name", ["race", "endure", "automatic", "peers", "paper", "chaos"])
+@pytest.mark.parametrize("name", ["race", "endure", "automatic", "peers", "paper", "chaos", "costs"])
 def test_a_stored_report_is_redrawn_with_the_same_markdown(name, undrawn):
     folder = REPORTS / name
     made = document(opened([folder]))
