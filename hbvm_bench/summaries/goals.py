@@ -12,12 +12,12 @@ from hbvm_bench.measure.metrics import METRICS, find
 from hbvm_bench.measure.timing import Spread
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries import standings
+from hbvm_bench.summaries.outcomes import OTHER_WORK
 from hbvm_bench.summaries.points import number
 from hbvm_bench.summaries.rows import format_metric
 from hbvm_bench.summaries.standings import Comparison
 from hbvm_bench.summaries.table import NONE, Table
 
-OTHER_WORK = 0.1  # of a core: with more beside the times, no speed is judged
 TIMES = ("warm_seconds", "throughput")
 
 PLACE = ("position", "phase", "z_error")

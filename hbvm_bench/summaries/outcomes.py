@@ -12,7 +12,7 @@ from hbvm_bench.summaries.table import Table
 
 UNDISTURBED = 0.9  # of a core, in the timing pass
 STEADY = 1.5  # quartiles of the calibration around a timing sample
-BUSY = 0.05  # of a core: more than this beside the timings makes them doubtful
+OTHER_WORK = 0.1  # of a core: with more beside the times these are doubtful, and no speed is judged
 
 State = Literal["on", "apart", "uncompared", "off", "ended", "refused", "absent"]
 
@@ -189,7 +189,7 @@ def by_compilation(record: Record) -> list[float]:
 
 def busy(records: Sequence[Record]) -> bool:
     """Whether the machine had so much other work that interleaved times are doubtful."""
-    return any(max(load.others, load.stolen) > BUSY for load in _loads(records))
+    return any(max(load.others, load.stolen) > OTHER_WORK for load in _loads(records))
 
 
 def _loads(records: Sequence[Record]) -> list[Load]:

@@ -25,7 +25,7 @@ from hbvm_bench.studies.computations import (
     telling,
 )
 from hbvm_bench.studies.drawn import number
-from hbvm_bench.summaries.goals import OTHER_WORK
+from hbvm_bench.summaries.outcomes import OTHER_WORK
 from hbvm_bench.summaries.rows import seconds as in_words
 from hbvm_bench.summaries.table import NONE, Table
 from integrators.dynamics.lyapunov import INTERVALS

@@ -18,7 +18,8 @@ from hbvm_bench.studies.computations import Part, Results, Task, load, run_all, 
 from hbvm_bench.studies.costs import experiments
 from hbvm_bench.studies.costs.experiments import CALLED, FIRST, ON_LATTICES, STEPPED, Iterations, Times
 from hbvm_bench.summaries import compilations, outcomes, standings
-from hbvm_bench.summaries.goals import OTHER_WORK, other_work, ratio_text
+from hbvm_bench.summaries.goals import other_work, ratio_text
+from hbvm_bench.summaries.outcomes import OTHER_WORK
 from hbvm_bench.summaries.points import family_of
 from hbvm_bench.summaries.rows import format_metric, grouped_by, status_of
 from hbvm_bench.summaries.table import NONE, Table

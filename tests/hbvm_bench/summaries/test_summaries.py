@@ -200,7 +200,7 @@ def test_times_of_a_busy_machine_are_doubtful():
     assert "disturbed" in outcomes.doubts([timed(0.5, [])])[0]
     (loaded,) = outcomes.doubts([timed(1.0, [], load=Load(others=0.57, stolen=0.0))])
     assert "used 57% of a core, and the steal time was 0% of one; the times are doubtful" in loaded
-    (quiet,) = outcomes.doubts([timed(1.0, [], load=Load(others=0.01, stolen=0.0))])
+    (quiet,) = outcomes.doubts([timed(1.0, [], load=Load(others=0.1, stolen=0.0))])
     assert "doubtful" not in quiet
     assert "not steady" in outcomes.doubts([timed(1.0, [0.01, 0.01, 0.03, 0.03])])[0]
     assert "Nothing was timed" in outcomes.doubts([record("Taylor()")])[0]
