@@ -88,7 +88,7 @@ def warnings(
     place = f"between t = {t!r} and {t + h!r}" if h else f"at t = {t!r}"
     return (
         *said,
-        "the right-hand side or its derivative is discontinuous "
+        "the right-hand side or one of its derivatives is discontinuous "
         f"(places recorded: {len(kinks)}, the first {place}): steps were "
         "cut there, and what lies between two nodes may have been missed; give breakpoints where the "
         "times are known.",

@@ -118,7 +118,7 @@ class HBVM(MethodBase):
         Length that no step exceeds, > 0, in units of time; with ``tol``. For a field with pulses or
         bumps that are shorter than the steps the estimate allows.
     breakpoints : sequence of float, optional
-        Times at which the right-hand side or its derivative is discontinuous, in any order; with
+        Times at which the right-hand side or one of its derivatives is discontinuous, in any order; with
         ``tol``. A step ends at each of them that is passed, and nothing from before it is used after it.
         The times at which formulas switch need not be given where they follow from conditions and
         tables of anything affine in the time,
