@@ -31,7 +31,7 @@ def record(method, seconds, energy, position, **more):
         **more,
     )
     timing = Timing(
-        rounds=rounds, machine=MACHINE, process="one", call=1e-5, load=Load(others=0.3, stolen=0.0)
+        rounds=rounds, machine=MACHINE, process="one", call=1e-5, load=Load(others=0.08, stolen=0.0)
     )
     return msgspec.structs.replace(made, timing=timing if rounds else None)
 
