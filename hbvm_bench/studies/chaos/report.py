@@ -309,9 +309,9 @@ HOW = (
     f"Ours: `{exponents.METHOD!r}` with its tangent vectors (`integrators.lyapunov`). heyoka: "
     f"`var_ode_sys` of first order and `taylor_adaptive` with tol={exponents.TOLERANCE:g}. Both make all "
     f"vectors orthonormal equally often, at least {INTERVALS} times, in Python; the runs of one "
-    "system alternate in one process on one core, compiled before. Intervals: 95 %, from the averages over "
-    "blocks of the time; of fifteen such intervals 0.75 miss the true value on average. The last digits of "
-    "published values are estimates."
+    "system alternate in one process on one core, compiled before. Intervals: 95 %, from the slowest "
+    "fluctuations of the growth; of fifteen such intervals 0.75 miss the true value on average. The last "
+    "digits of published values are estimates."
 )
 
 
