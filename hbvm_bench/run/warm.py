@@ -15,7 +15,8 @@ and has one environment and one set of cores for all that it starts. Where a sys
 A warm process is asked over a socket::
 
     runner -> warm process    the path of a request; with it the case's own socket and its output
-    warm process -> runner    on the case's socket: the process of the case, and at its end the exit code
+    warm process -> runner    on the case's socket: the process of the case and the pipe at which it waits
+                              until the runner knows it; at its end the exit code
     case -> runner            on the case's socket: that it is done, and stays to be forked from
 """
 
@@ -108,7 +109,7 @@ class Fork:
             socket.send_fds(asked, [os.fsencode(path)], [theirs.fileno(), out])
             theirs.close()  # or nobody would be seen to be gone
             _until_answered(self._socket)
-            said, handles, _, _ = socket.recv_fds(self._socket, LONGEST, 1, socket.MSG_CMSG_CLOEXEC)
+            said, handles, _, _ = socket.recv_fds(self._socket, LONGEST, 2, socket.MSG_CMSG_CLOEXEC)
             if not handles:
                 raise ConnectionError("the warm process has ended")
         except OSError:
@@ -118,8 +119,11 @@ class Fork:
         finally:
             theirs.close()
             os.close(out)
-        self.pid, self._handle = int(said), handles[0]
+        self.pid, (self._handle, opens) = int(said), handles
         self.lost = False
+        with contextlib.suppress(BrokenPipeError):  # it was killed meanwhile
+            os.write(opens, b"\0")  # not left to the warm process, which may be stopped before it does
+        os.close(opens)
 
     def wait(self, seconds: float | None = None) -> int | None:
         """Return the exit code, or ``None`` where it still runs after so many seconds."""
@@ -256,7 +260,7 @@ def _fork(asked: socket.socket) -> tuple[int, Path, socket.socket]:
             if pid == 0:
                 os.setsid()
                 os.close(opens)
-                os.read(gate, 1)  # until the runner knows it
+                os.read(gate, 1)  # until the runner knows it, or is gone
                 for stream in (1, 2):
                     os.dup2(out, stream)
                 for inherited in (gate, out, *running):
@@ -266,7 +270,7 @@ def _fork(asked: socket.socket) -> tuple[int, Path, socket.socket]:
                 return parent, Path(os.fsdecode(path)), runner
             handle = os.pidfd_open(pid)
             with contextlib.suppress(OSError):
-                socket.send_fds(runner, [str(pid).encode()], [handle])
+                socket.send_fds(runner, [str(pid).encode()], [handle, opens])
             for inherited in (gate, opens, out):
                 os.close(inherited)
             running[handle] = pid, runner

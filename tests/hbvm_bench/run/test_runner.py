@@ -365,15 +365,24 @@ def test_a_case_whose_warm_process_is_killed_meanwhile_runs_again(toys, store):
 
 
 def stopped_meanwhile(store, method, limits, act):
-    """Run a case, stop its warm process meanwhile, do ``act`` and return the record."""
+    """Run a case, stop its warm process as soon as it has started it, do ``act`` and return the record."""
     warm.close()
     before = set(psutil.Process().children())
-    with concurrent.futures.ThreadPoolExecutor(1) as pool:
+    nests = []
+
+    def stop_at_once(asked):
+        until_answered(asked)
+        if not nests:
+            nests.extend(set(psutil.Process().children()) - before)
+            nests[0].suspend()
+
+    until_answered = warm._until_answered
+    with pytest.MonkeyPatch.context() as patch, concurrent.futures.ThreadPoolExecutor(1) as pool:
+        patch.setattr(warm, "_until_answered", stop_at_once)
         future = pool.submit(run_case, case(method), str(store.directory), limits)
         while not supervise._children:
             time.sleep(0.01)
-        (nest,) = set(psutil.Process().children()) - before
-        nest.suspend()
+        (nest,) = nests
         act()
         try:
             return future.result(timeout=30)
