@@ -131,10 +131,25 @@ def sections_of(parts: Sequence[tuple[Part, "Results"]]) -> list[Section]:
     ]
 
 
-def telling(tell: Callable[[str], None], count: int) -> Callable[[str, str], None]:
-    """Return a function that says which of so many computations has ended, as `run_all` calls it."""
-    ended = itertools.count(1)
-    return lambda key, said: tell(f"  computation {next(ended)} of at most {count}, {key}: {said}")
+def computing(
+    name: str, parts: Callable[[bool], Sequence[Part]]
+) -> Callable[[Store, int, Callable[[str], None]], None]:
+    """Return the function that computes what a store lacks of a study, as ``COMPUTATIONS`` name it.
+
+    ``parts`` returns the experiments, given whether the run is quick.
+    """
+
+    def compute(store: Store, jobs: int, tell: Callable[[str], None]) -> None:
+        quick = store.index().campaign.quick
+        tasks = [task for part in parts(quick) for task in part.tasks]
+        ended = itertools.count(1)
+
+        def done(key: str, said: str) -> None:
+            tell(f"  computation {next(ended)} of at most {len(tasks)}, {key}: {said}")
+
+        run_all(name, tasks, jobs, store, done, variant="quick" * quick)
+
+    return compute
 
 
 def run_all(

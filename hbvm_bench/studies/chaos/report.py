@@ -1,6 +1,6 @@
 """The page on chaos, from kept results alone: published values and ours, and the maps."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from statistics import median
@@ -10,7 +10,6 @@ import numpy as np
 from hbvm_bench.report.document import Claim, Items, Maker, Note, Section
 from hbvm_bench.report.page import Results as Run
 from hbvm_bench.report.page import block
-from hbvm_bench.store.store import Store
 from hbvm_bench.studies.chaos import exponents, figures, maps, orbits
 from hbvm_bench.studies.chaos.systems import SOURCES, SYSTEMS, Known, Published
 from hbvm_bench.studies.computations import (
@@ -18,11 +17,10 @@ from hbvm_bench.studies.computations import (
     Results,
     Task,
     claims_of,
+    computing,
     load,
-    run_all,
     sections_of,
     split,
-    telling,
 )
 from hbvm_bench.studies.drawn import number
 from hbvm_bench.summaries.outcomes import OTHER_WORK
@@ -157,14 +155,7 @@ def parts(*, quick: bool) -> list[Part]:
     ]
 
 
-def compute(store: Store, jobs: int, tell: Callable[[str], None]) -> None:
-    """Compute what is missing beside the cases of a run."""
-    quick = store.index().campaign.quick
-    tasks = [task for part in parts(quick=quick) for task in part.tasks]
-    run_all(NAME, tasks, jobs, store, telling(tell, len(tasks)), variant="quick" * quick)
-
-
-COMPUTATIONS = {"compute": compute}
+COMPUTATIONS = {"compute": computing(NAME, lambda quick: parts(quick=quick))}
 
 
 @block

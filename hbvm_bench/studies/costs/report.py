@@ -13,8 +13,7 @@ from hbvm_bench.report.document import Items, Maker, Note, Section, attempt
 from hbvm_bench.report.page import Results as Run
 from hbvm_bench.report.page import block
 from hbvm_bench.store.records import Record
-from hbvm_bench.store.store import Store
-from hbvm_bench.studies.computations import Part, Results, Task, load, run_all, sections_of, telling
+from hbvm_bench.studies.computations import Part, Results, Task, computing, load, sections_of
 from hbvm_bench.studies.costs import experiments
 from hbvm_bench.studies.costs.experiments import CALLED, FIRST, ON_LATTICES, STEPPED, Iterations, Times
 from hbvm_bench.summaries import compilations, outcomes, standings
@@ -96,14 +95,7 @@ def parts(*, quick: bool) -> list[Part]:
     ]
 
 
-def compute(store: Store, jobs: int, tell: Callable[[str], None]) -> None:
-    """Compute what is missing beside the cases of a run."""
-    quick = store.index().campaign.quick
-    tasks = [task for part in parts(quick=quick) for task in part.tasks]
-    run_all(NAME, tasks, jobs, store, telling(tell, len(tasks)), variant="quick" * quick)
-
-
-COMPUTATIONS = {"compute": compute}
+COMPUTATIONS = {"compute": computing(NAME, lambda quick: parts(quick=quick))}
 
 
 @block

@@ -11,15 +11,13 @@ from hbvm_bench.report.document import Items, Maker, Note, Section
 from hbvm_bench.report.figures.style import INK, MUTED
 from hbvm_bench.report.page import Results as Run
 from hbvm_bench.report.page import block
-from hbvm_bench.store.store import Store
 from hbvm_bench.studies.computations import (
     Part,
     Results,
     Task,
+    computing,
     load,
-    run_all,
     sections_of,
-    telling,
 )
 from hbvm_bench.studies.drawn import WIDTH, Said, drawn
 from hbvm_bench.studies.random_hamiltonians.systems import COUNT, DRAWS, FAMILIES, SEED, family_of
@@ -67,14 +65,7 @@ def parts(*, quick: bool) -> list[Part]:
     return [Part("trials", "Errors behind a success", tasks, lambda results: [], blocks)]
 
 
-def compute(store: Store, jobs: int, tell: Callable[[str], None]) -> None:
-    """Compute what is missing beside the cases of a run."""
-    quick = store.index().campaign.quick
-    tasks = [task for part in parts(quick=quick) for task in part.tasks]
-    run_all(NAME, tasks, jobs, store, telling(tell, len(tasks)), variant="quick" * quick)
-
-
-COMPUTATIONS = {"compute": compute}
+COMPUTATIONS = {"compute": computing(NAME, lambda quick: parts(quick=quick))}
 
 
 @block
