@@ -99,7 +99,7 @@ def told(starts: int) -> str:
     return (
         f"A drift is reported where the mean over the {starts} starts is more than {limit(starts):.3g} of "
         "its standard errors from 0; of errors that do not drift, chance puts "
-        f"{100.0 * false_alarms(starts):.0f} % there"
+        f"{100.0 * false_alarms(starts):.1g} % there"
     )
 
 

@@ -57,8 +57,8 @@ def solve(problem: Problem, method: MethodBase, program: Program, times: Array) 
 def solve_with_bare_end(problem: Problem, method: MethodBase, program: Program, times: Array) -> Solution:
     """Return the same, but for the end, which is that of a second run without samples.
 
-    That is the run that is timed, and an error at the end is to be of the very run that is. The last
-    time is the problem's end.
+    That is the run that is timed, and an error at the end is to be of the very run that is, as are the
+    numbers of steps and evaluations. The last time is the problem's end.
     """
     sampled = solve(problem, method, program, times)
     if sampled.status is not Status.FINISHED:
@@ -73,6 +73,7 @@ def solve_with_bare_end(problem: Problem, method: MethodBase, program: Program, 
         status=end.status,
         reason=end.reason,
         t_stop=sampled.t_stop if end.status is Status.FINISHED else float(before[-1]),
+        stats=replace(stepper.stats),
     )
 
 

@@ -56,9 +56,10 @@ class _Direction:
         """Return the compiled solve for the direction ``sign``."""
         return self if sign == self.sign else _Direction(*self._of, sign)
 
-    def plain(self, t: float, end: float, *rest: Any) -> Any:
+    def plain(self, t: float, end: float, *rest: Any) -> tuple[Array, list[int]]:
         """Solve plainly; see `integrators.peers.diffrax.solve.Solve.plain`."""
-        return self.solve.plain.call(np.float64(self.sign * t), np.float64(self.sign * end), *rest)
+        y, counts = self.solve.plain.call(np.float64(self.sign * t), np.float64(self.sign * end), *rest)
+        return np.asarray(y), np.asarray(counts).tolist()
 
 
 class DiffraxStepper(FixedStepper):
@@ -85,11 +86,11 @@ class DiffraxStepper(FixedStepper):
         way, states = self._way, np.empty((grid.size, self._y.size))
         t, y = self._t, self._y
         for i, end in enumerate(grid.tolist()):
-            state, accepted, _, arrived = way.plain(t, end, np.float64(abs(self._h)), y, self._par)
-            t, y = end, np.asarray(state) if arrived else np.full(y.size, np.nan)
+            state, (accepted, _, arrived) = way.plain(t, end, np.float64(abs(self._h)), y, self._par)
+            t, y = end, state if arrived else np.full(y.size, np.nan)
             states[i] = y
-            self._stats.steps += int(accepted)
-            self._evaluated(int(accepted))
+            self._stats.steps += accepted
+            self._evaluated(accepted)
             self._t0, self._n, self._states, self._inner = t, 0, y, None
             if not math.isfinite(y.sum()):
                 return grid[: i + 1], states[: i + 1]
@@ -199,14 +200,14 @@ class AdaptiveStepper(RestorableStepper):
         states, t, y = np.empty((grid.size, self._y.size)), self._t, self._y
         for i, end in enumerate(grid.tolist()):
             self._inner = None
-            state, accepted, rejected, arrived = self._way.plain(t, end, y, self._par, *self._tolerances)
+            state, (accepted, rejected, arrived) = self._way.plain(t, end, y, self._par, *self._tolerances)
             if not arrived:  # why not is found out under a watch
                 _, y = self._watched(t, y, end, crawl(self, t, end))
                 if self._status.failed:
                     return grid[:i], states[:i]
                 state, accepted, rejected, self._inner = y, 0, 0, None
-            self._count(int(accepted), int(rejected))
-            t, y = end, np.asarray(state)
+            self._count(accepted, rejected)
+            t, y = end, state
             states[i] = y
         return grid, states
 

@@ -28,7 +28,6 @@ class FixedMethod(ReboundMethod):
     h: Step
 
     unsynchronized: ClassVar[bool] = False  # whether a sample is a synchronised copy
-    counted: ClassVar[bool] = True  # whether REBOUND tells of each evaluation of the forces
 
     def stepper(self, program: ReboundProgram, layout: Layout, y: Array, t: float) -> "ReboundStepper":
         """Return a trajectory."""

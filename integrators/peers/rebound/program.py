@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from time import perf_counter
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,7 @@ class ReboundMethod(MethodBase):
     """What REBOUND's methods share."""
 
     library = "rebound"
+    counted: ClassVar[bool] = True  # whether REBOUND tells of each evaluation of the forces
 
     def accepts(self, problem: Problem) -> str | None:
         """Return None for gravitating bodies and for q'' = c force(t, q), else the reason."""
@@ -95,7 +96,7 @@ class ReboundProgram(ProgramBase):
 
         started = perf_counter()
         self.method, self.hooks = method, hooks
-        self.watch, self.force = hooks.watchdog(), hooks.counter()
+        self.watch, self.force = hooks.watchdog(), hooks.counter() if method.counted else None
         if system.bodies is None:
             known = hooks.forces.cache_info().hits
             self.force = hooks.forces(emit.numba(system, "force"), system.dim // 2, system.n_par)

@@ -3,6 +3,7 @@
 import copy
 import math
 from collections.abc import Callable
+from functools import partial
 from time import perf_counter
 from types import FunctionType
 from typing import Any
@@ -15,6 +16,7 @@ from integrators.running.watchdog import Crawl, crawl
 from integrators.stepping import ProgramBase, RestorableStepper, StepperBase
 from problems.problem import System
 
+QUIET = partial(np.errstate, all="ignore")  # once a call of ours, for it takes a quarter of a step of LSODA
 DENSE, SPARSE = 64, 0.1  # a Jacobian of more rows, of which a smaller part is not zero, is a sparse matrix
 
 
@@ -87,7 +89,8 @@ class SciPyStepper(StepperBase):
         self._program, self._par = program, par
         self._stats.evaluations = 0
         self._stats.extra["side_evaluations"] = 0
-        self._solver = self._begin(t, y, 1.0)
+        with QUIET():
+            self._solver = self._begin(t, y, 1.0)
 
     def _evaluate(self, t: float, y: Array) -> Array:
         # SciPy's own count, nfev, leaves out the evaluations of its finite differences.
@@ -125,10 +128,9 @@ class SciPyStepper(StepperBase):
     ) -> Any:
         method = self._program.method
         known = {} if self._program.jacobian is None else {"jac": self._jacobian}
-        with np.errstate(all="ignore"):
-            return self._program.solver(
-                fun, t, y, end, rtol=method.rtol, atol=method.atol, first_step=first, **known
-            )
+        return self._program.solver(
+            fun, t, y, end, rtol=method.rtol, atol=method.atol, first_step=first, **known
+        )
 
     def _begin(self, t: float, y: Array, sign: float) -> Any:
         solver = self._make(self._evaluate, t, y, sign * math.inf)
@@ -148,6 +150,7 @@ class SciPyStepper(StepperBase):
         if count:
             self._stats.extra[name] = self._stats.extra.get(name, 0) + count
 
+    @QUIET()
     def _serve(self, grid: Array, how: str) -> tuple[Array, Array]:
         sign = self._towards(float(grid[-1]))
         states = np.empty((grid.size, self._y.size))
@@ -167,6 +170,7 @@ class SciPyStepper(StepperBase):
                 return grid[: i + 1], states[: i + 1]
         return grid, states
 
+    @QUIET()
     def _step_states(self, end: float) -> tuple[Array, Array]:
         sign = self._towards(end)
         self._bound(sign * math.inf)
@@ -179,6 +183,7 @@ class SciPyStepper(StepperBase):
             states.append(self._solver.y)
         return np.array(times[1:]), np.array(states)[1:]
 
+    @QUIET()
     def _one_step(self) -> tuple[float, Array] | None:
         self._bound(self._solver.direction * math.inf)
         if self._solver.t == self._t and not self._step(Crawl(self._t, self._t)):
@@ -197,8 +202,7 @@ class SciPyStepper(StepperBase):
         solver, stats = self._solver, self._stats
         before, jacobians, factored = float(solver.t), solver.njev, solver.nlu
         try:
-            with np.errstate(all="ignore"):
-                message = solver.step()
+            message = solver.step()
         except UserError as raised:
             self._broken(raised, before)
             return False
@@ -223,9 +227,8 @@ class SciPyStepper(StepperBase):
             return self._solver.dense_output()(t)
         start = float(self._solver.t_old)
         aside = self._make(self._evaluate_aside, start, self._solver.y_old, t, abs(t - start))
-        with np.errstate(all="ignore"):
-            while aside.status == "running":
-                aside.step()
+        while aside.status == "running":
+            aside.step()
         return aside.y if aside.status == "finished" else np.full(self._y.size, np.nan)
 
 

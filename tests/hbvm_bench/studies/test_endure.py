@@ -89,7 +89,7 @@ def test_a_small_drift_is_a_drift_all_the_same(tmp_path):
     (table, _) = endure.tables(result)
     assert "0 of 16 positive" in str(table.rows[0])
     assert (
-        "more than 3 of its standard errors from 0; of errors that do not drift, chance puts 1 %"
+        "more than 3 of its standard errors from 0; of errors that do not drift, chance puts 0.9 %"
         in table.note
     )
 
