@@ -41,6 +41,7 @@ AT_ONCE = 2 * DRAWS  # problems of one process
 QUICK = (0, 52)  # problems of a quick run, and its methods
 QUICK_METHODS = ("HBVM()", "Taylor(tol=1e-10)", "DOP853(rtol=1e-10, atol=1e-06)")
 FACTORS = (10.0, 100.0, 1000.0)
+UNANSWERED = (NO_ANSWER, CRASHED)
 Judge = Callable[[Outcome, Trial], float]
 
 
@@ -180,15 +181,19 @@ def endings(outcomes: Sequence[Outcome]) -> Table:
     for method in METHODS:
         ended = [trial for outcome in solved for trial in outcome.trials if trial.method == method]
         ran = [trial for trial in ended if trial.status != REFUSED]
-        other = [trial for trial in ran if not trial.success]
-        hung = sum(trial.status in (NO_ANSWER, CRASHED) for trial in other)
+        reported = sum(not trial.success and trial.status not in UNANSWERED for trial in ran)
+        hung = sum(
+            trial.method == method and trial.status in UNANSWERED
+            for outcome in outcomes
+            for trial in outcome.trials
+        )
         times = [trial.seconds for trial in ran if trial.success]
         rows.append(
             (
                 method,
                 f"{len(ran)}",
                 f"{len(ended) - len(ran)}" if len(ended) > len(ran) else NONE,
-                share(len(other) - hung, len(ran)),
+                share(reported, len(ran)),
                 f"{hung}" if hung else NONE,
                 in_words(median(times)) if times else NONE,
                 in_words(max(times)) if times else NONE,
@@ -197,9 +202,19 @@ def endings(outcomes: Sequence[Outcome]) -> Table:
         )
     return Table(
         "Failures reported, and times",
-        ("method", "problems", "refused", "failure reported", "no answer", "median time", "longest", "steps"),
+        (
+            "method",
+            "problems",
+            "refused",
+            "failure reported",
+            "no answer, of all problems",
+            "median time",
+            "longest",
+            "steps",
+        ),
         rows,
-        f"Of problems with a reference. No answer: the process crashed or was ended after {LIMIT:g} s. "
+        "Of the problems with a reference. No answer: the process crashed or was ended after "
+        f"{LIMIT:g} s; counted on all problems. "
         "Times: CPU seconds of one run without compiling, through `integrate`, beside a second process of "
         "the same kind: orders of magnitude. Steps: the median.",
         key="random-endings",
@@ -229,16 +244,24 @@ def families(outcomes: Sequence[Outcome]) -> Table:
 
 def left_out(outcomes: Sequence[Outcome]) -> Items:
     """Return which problems are not judged, and what was reported on those without a reference."""
-    said = []
+    said: dict[str, list[int]] = {}
     for outcome in outcomes:
-        arrived = [trial.method for trial in outcome.trials if trial.success]
-        name = f"problem {outcome.number} ({family_of(outcome.number)})"
         if not outcome.end:
-            who = ", ".join(arrived) or "by none"
-            said.append(f"{name} has no reference: {outcome.why.rstrip('.')}. Success reported: {who}.")
+            asked = [trial for trial in outcome.trials if trial.status != REFUSED]
+            failed = [trial.method for trial in asked if not trial.success]
+            who = "all" if not failed else f"all but {', '.join(failed)}"
+            who = "none" if len(failed) == len(asked) else who
+            why = f"no reference: {outcome.why.rstrip('.')}. Success reported by {who}."
         elif not outcome.judged:
-            said.append(f"{name}: condition number {outcome.condition:.1e}; positions are not judged.")
-    return Items(said or ["All problems are judged."])
+            why = f"condition number {outcome.condition:.1e}; positions are not judged."
+        else:
+            continue
+        said.setdefault(f"({family_of(outcome.number)}): {why}", []).append(outcome.number)
+    lines = [
+        f"{'problem' if len(numbers) == 1 else 'problems'} {', '.join(map(str, numbers))} {why}"
+        for why, numbers in said.items()
+    ]
+    return Items(lines or ["All problems are judged."])
 
 
 POSITION = (
