@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.linalg import expm
+from scipy.optimize import brentq
 from scipy.special import ellipk
 
 import problems
@@ -119,6 +120,30 @@ def test_a_family_of_halo_orbits():
             assert np.abs(found - value).min() < 1e-8 * max(1.0, abs(value))
     periods = np.array([orbit.period for orbit in [first, *family]])
     assert (np.diff(periods) < 0.0).all()
+
+
+def test_a_halo_orbit_of_the_jpl_catalogue_has_its_stability_index():
+    """An orbit around L1 of Earth and Moon, which the catalogue tells by its Jacobi constant.
+
+    The values of JPL's catalogue of three-body periodic orbits are printed in the documentation of the Julia
+    package CRTBPNaturalMotion.jl (page "JPL API example").
+    """
+    system = Hamiltonian(spatial, dof=3, parameters={"mu": 1.215058560962404e-2})
+    problem = Problem(system, q0=[0.9173237, 0.0, 0.33820103], p0=[0.0, 1.00485366, 0.0], t_end=2.35396002)
+    first = periodic(problem, mirror=[1, -1, 1, -1, 1, -1], free=[0, 4, "period"])
+    assert first.converged, first.reason
+
+    def difference(z):
+        (orbit,) = continued(first, 2, [z])
+        return -2.0 * problem.invariants(orbit.y0[np.newaxis])["energy"][0] - 2.90165039860189
+
+    z = first.y0[2]
+    z = brentq(difference, z - 1e-6, z + 1e-6, xtol=1e-16)
+    assert abs(difference(z)) < 1e-14  # measured: 0
+    (orbit,) = continued(first, 2, [z])
+    size = abs(orbit.multipliers[0])
+    assert abs((size + 1.0 / size) / 2.0 / 4.96768347393297 - 1.0) < 1e-8  # measured: 1.7e-12
+    assert orbit.period == pytest.approx(2.35396002, abs=1e-8)
 
 
 def test_the_period_of_a_pendulum_is_an_elliptic_integral():
