@@ -18,7 +18,7 @@ from hbvm_bench.report.figures.style import Look
 from hbvm_bench.summaries.rows import Row
 from hbvm_bench.summaries.table import Table
 
-SHOWN = 4  # figures beside the markdown
+SHOWN = 4  # figures beside the markdown, and those that are always there
 VERDICTS = {"holds": "confirmed", "partly": "confirmed in part", "no": "not found"}
 
 
@@ -180,8 +180,8 @@ class Document:
 
     @property
     def shown(self) -> list[Picture]:
-        """The figures that the markdown shows; the page has all of them."""
-        return self.pictures[:SHOWN]
+        """The figures that the markdown shows, the first and those ``in_text``; the page has all of them."""
+        return [figure for i, figure in enumerate(self.pictures) if i < SHOWN or figure.in_text]
 
     @property
     def failed(self) -> list[Failed]:

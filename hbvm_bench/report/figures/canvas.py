@@ -66,6 +66,7 @@ class Picture:
     numbers: Table | None = None  # what it shows
     motion: dict[str, Any] | None = None  # what the page's moving view of it is made of
     values: bool = False  # whether its colours mean values, so that no theme may brighten them
+    in_text: bool = False  # whether the markdown shows it, however many figures come before it
 
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[\w-]+", self.key):

@@ -140,6 +140,7 @@ def sections(
     WIDTH,
     4.0,
     values=True,
+    in_text=True,
 )
 def asteroids(
     figure: Figure, axes_: Sequence[float], eccentricities: Sequence[float], rows: Sequence[Array], turns: int

@@ -151,6 +151,15 @@ def test_the_markdown_shows_the_first_figures_and_the_page_all():
     assert b'href="b.json" download="b.json">' in files["index.html"]
 
 
+def test_a_figure_in_the_text_is_shown_however_many_come_before_it():
+    figures = [dataclasses.replace(drawn(), key=f"drawn-{i}") for i in range(SHOWN + 2)]
+    last = dataclasses.replace(figures.pop(), in_text=True)
+    files = rendered(Document("t", ["l"], [*figures, last]))
+    assert f"figures/{last.key}.svg" in files
+    assert f"figures/drawn-{SHOWN}.svg" not in files
+    assert files["README.md"].count(b"![") == SHOWN + 1
+
+
 def test_a_figure_is_as_wide_as_it_was_drawn():
     assert f"max-width:{216 * html.ENLARGED:.0f}px" in html.drawing(drawn(), {})
 

@@ -111,6 +111,7 @@ def test_a_quick_run_computes_and_draws_everything(tmp_path, monkeypatch):
     drawn = (tmp_path / "report" / "index.html").read_text(encoding="utf-8")
     for key in ("values", "megno", "sitnikov", "sections", "asteroids"):
         assert f'id="chaos-{key}' in drawn
+        assert f"(figures/chaos-{key}.svg)" in text
 
 
 def test_a_quick_run_of_a_campaign_without_times_takes_none():
