@@ -16,6 +16,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from integrators import registry
+from integrators.dynamics.divergence import mean_divergence
 from integrators.dynamics.vectors import with_variations
 from integrators.protocol import Array, MethodBase, Status
 from problems.checks import at_least, checked_arguments
@@ -36,6 +37,7 @@ RANGE = 25.0  # the logarithm of a length itself may be so many times as large: 
 FIRST = 16  # steps of the first round
 LONGER = 4  # times as many steps in the next round, at most
 ROOM = 1 << 24  # bytes of the vectors of a round's steps, at most
+MOST_DIGITS = 12  # after the decimal point, where exponents are printed
 REPEATED = 64  # rounds from one checkpoint to the next: one takes the time of several short rounds
 
 
@@ -49,9 +51,16 @@ class Exponents:
         In 1/time, the largest first.
     intervals : ndarray, shape (count, 2)
         Each with 95 % confidence, from the 8 slowest cosines in the growth over the time. Where 0 cannot be
-        excluded, (log T)/T is added on both sides, as which exponents that are 0 vanish in the time T.
+        excluded, as on regular motion, they are a bound of convergence instead: exponents that are 0 vanish
+        like (log T)/T in the time T. As the factor of that is not known, (log T)/T is added to the half
+        length, which is itself a small multiple of it there.
     sum : float
         Of the exponents; with all of them, the mean divergence of the field.
+    divergence : float or None
+        That mean along the trajectory, computed without the vectors: exact where it is constant, else the
+        integral of a further component by the quadrature of the same steps, taken once more, so that it is
+        the sum to the local error of the vectors. ``None`` where not all exponents are asked for, and for
+        systems so large that the Jacobian is not written down.
     pairs : float or None
         The largest sum of two exponents that are each other's negative, for all exponents of a canonical
         system: with `Gauss` this is rounding.
@@ -66,11 +75,36 @@ class Exponents:
     exponents: Array
     intervals: Array
     sum: float
+    divergence: float | None
     pairs: float | None
     time: float
     rounds: int
     status: Status
     reason: str
+
+    def __str__(self) -> str:
+        """Return the exponents with their intervals, and what must hold of them, one a line."""
+        bound = _slow(self.time)
+        lines = [f"Lyapunov exponents in 1/time, averages over T = {self.time:.10g}; intervals of 95 %"]
+        for value, (low, high) in zip(self.exponents.tolist(), self.intervals.tolist(), strict=True):
+            half = (high - low) / 2.0
+            digits = min(max(0, 1 - int(np.floor(np.log10(max(half, 1e-300))))), MOST_DIGITS)
+            line = f"  {value:+.{digits}f} ± {half:.{digits}f}"
+            if low <= 0.0 <= high:
+                line += f"  0 is not excluded; zero exponents vanish like (log T)/T = {bound:.1e}"
+            lines.append(line)
+        line = f"sum {self.sum:.13g}"
+        if self.divergence is not None:
+            line += (
+                f", mean divergence along the trajectory {self.divergence:.13g}: difference "
+                f"{abs(self.sum - self.divergence):.0e}"
+            )
+        lines.append(line)
+        if self.pairs is not None:
+            lines.append(f"pairs of opposite sign: to {self.pairs:.0e}")
+        if self.reason:
+            lines.append(f"{self.status.value}: {self.reason}")
+        return "\n".join(lines)
 
 
 @checked_arguments
@@ -133,7 +167,14 @@ def lyapunov(
         raise InputError(f"there are too few steps after skip={skip!r} for intervals: {why}")
     canonical = system.dof is not None and n == system.dim
     exponents, intervals, pairs, time = _averaged(problem.t0 + skip, times, growth, canonical)
-    return Exponents(exponents, intervals, float(exponents.sum()), pairs, time, course.rounds, status, reason)
+    divergence = None
+    if n == system.dim:
+        begin = int(np.searchsorted(times, problem.t0 + skip))
+        again = with_variations(problem, method)
+        divergence = mean_divergence(problem, again, float(times[begin]), float(times[-1]), marks)
+    return Exponents(
+        exponents, intervals, float(exponents.sum()), divergence, pairs, time, course.rounds, status, reason
+    )
 
 
 class _Rounds:
@@ -238,10 +279,15 @@ def _averaged(
     middles = (ends[1:] + ends[:-1]) / 2.0 - ends[0]
     waves = np.cos(np.pi / time * np.outer(np.arange(1, WAVES + 1), middles)) @ np.diff(grown, axis=0)
     half = STUDENT * np.sqrt(2.0 * np.mean(waves**2, axis=0)) / time
-    slow = np.log(max(time, np.e)) / time
+    slow = _slow(time)
     half = np.where(np.abs(exponents) <= half + slow, half + slow, half)
     pairs = float(np.abs(exponents + exponents[::-1]).max()) if canonical else None
     order = np.argsort(-exponents)
     exponents, half = exponents[order], half[order]
     intervals = np.stack([exponents - half, exponents + half], axis=1)
     return exponents, intervals, pairs, time
+
+
+def _slow(time: float) -> float:
+    """Return (log T)/T, like which exponents that are 0 vanish."""
+    return float(np.log(max(time, np.e)) / time)

@@ -1,6 +1,7 @@
 """Exponents of systems where they are known, and what must hold of all."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -25,6 +26,104 @@ def test_lorenz():
     assert found.intervals[0, 1] - found.intervals[0, 0] < 0.05
     assert found.intervals[1, 0] < 0.0 < found.intervals[1, 1]
     assert abs(found.sum + 41.0 / 3.0) < 1e-10
+
+
+def rossler(y):
+    return [-y[1] - y[2], y[0] + 0.2 * y[1], 0.2 + y[2] * (y[0] - 5.7)]
+
+
+def sprott_a(y):
+    """The oscillator of Nose and Hoover; its divergence is y[2]."""
+    return [y[1], y[1] * y[2] - y[0], 1.0 - y[1] ** 2]
+
+
+def forced(t, y, par, m):
+    """A divergence that depends on the time and a parameter too."""
+    return [
+        y[1],
+        -m.sin(y[0]) - par.c * y[1] ** 3 + m.cos(1.3 * t),
+        -y[2] * (1.0 + m.sin(t) ** 2 * y[0] ** 2),
+    ]
+
+
+VARYING = {
+    "rossler": (VectorField(rossler, dim=3), [-9.0, 0.0, 0.0]),
+    "sprott_a": (VectorField(sprott_a, dim=3), [0.0, 5.0, 0.0]),
+    "forced": (VectorField(forced, dim=3, parameters={"c": 0.05}), [0.1, 0.2, 1.0]),
+}
+
+
+@pytest.mark.parametrize("name", VARYING)
+@pytest.mark.parametrize("method", [HBVM(), Gauss(s=6, h=0.02), Gauss(s=5, tol=1e-11)], ids=repr)
+def test_the_sum_is_the_mean_divergence_where_that_varies(name, method):
+    system, y0 = VARYING[name]
+    found = lyapunov(Problem(system, y0=y0, t_end=150.0), method, skip=20.0)
+    assert found.divergence is not None
+    # measured: at most 1.4e-14; 2.7e-8 for Gauss(s=5, tol=1e-11) on Roessler's, whose vectors shrink by
+    # exp(1.8) in one step of its
+    assert abs(found.sum - found.divergence) < (
+        1e-7 if name == "rossler" and method.options().get("tol") else 1e-12
+    )
+
+
+def test_the_sum_differs_from_the_mean_divergence_by_the_local_errors():
+    system, y0 = VARYING["rossler"]
+    errors = []
+    for h in (0.1, 0.05):
+        found = lyapunov(Problem(system, y0=y0, t_end=60.0), Gauss(s=2, h=h))
+        errors.append(abs(found.sum - found.divergence))
+    assert 3.5 < math.log2(errors[0] / errors[1]) < 4.5  # measured: 4.08, from 1.1e-2 and 6.2e-4
+
+
+def test_the_divergence_is_exact_where_it_is_constant_and_none_without_all_exponents():
+    system = VectorField(lorenz, dim=3, parameters={"s": 10.0, "r": 28.0, "b": 8.0 / 3.0})
+    problem = Problem(system, y0=[1.0, 1.0, 20.0], t_end=50.0)
+    assert lyapunov(problem, Gauss(s=6, h=0.02)).divergence == -10.0 - 1.0 - 8.0 / 3.0
+    assert lyapunov(problem, Gauss(s=6, h=0.02), count=2).divergence is None
+    assert lyapunov(problems.load("henon_heiles"), Gauss(s=6, h=0.25), t_end=50.0).divergence == 0.0
+    ring = VectorField(lambda y: [y[1], y[2], y[0]], dim=3)
+    assert lyapunov(Problem(ring, y0=[0.0] * 3, t_end=50.0), Gauss(s=4, h=0.1)).divergence == 0.0
+
+
+def test_the_divergence_of_declared_sums():
+    """A sum that stays a loop: the diagonal of its Jacobian stands in a list."""
+
+    def cubic(y, m):
+        return [-m.sum(lambda j, i=i: y[i] * y[j] ** 2, range(40)) for i in range(40)]
+
+    system = VectorField(cubic, dim=40)
+    problem = Problem(system, y0=np.linspace(0.1, 0.5, 40), t_end=2.0)
+    found = lyapunov(problem, Gauss(s=6, h=0.01))
+    assert abs(found.sum - found.divergence) < 1e-12 * abs(found.sum)  # measured: 3e-16
+
+
+def test_what_is_printed():
+    system, y0 = VARYING["rossler"]
+    text = str(lyapunov(Problem(system, y0=y0, t_end=150.0), Gauss(s=6, h=0.02), skip=20.0)).splitlines()
+    assert "Lyapunov exponents in 1/time" in text[0]
+    assert "95 %" in text[0]
+    assert [" ± " in line for line in text] == [False, True, True, True, False]
+    assert [("(log T)/T" in line) for line in text] == [False, True, True, False, False]
+    assert re.fullmatch(
+        r"sum -5\.\d+, mean divergence along the trajectory -5\.\d+: difference \de-1\d", text[4]
+    )
+    text = str(lyapunov(problems.load("henon_heiles"), Gauss(s=6, h=0.25), t_end=500.0, count=4))
+    assert "pairs of opposite sign: to" in text
+    text = str(lyapunov(problems.load("henon_heiles"), Gauss(s=6, h=0.25), t_end=500.0, count=1))
+    assert "divergence" not in text
+    assert "pairs" not in text
+
+
+@pytest.mark.parametrize("t_end", [1e2, 1e3, 1e4])
+def test_on_regular_motion_intervals_are_a_bound_of_convergence(t_end):
+    problem = problems.load("henon_heiles", energy=1 / 12, q2=0.05)
+    found, bound = lyapunov(problem, Gauss(s=6, h=0.25), t_end=t_end), math.log(t_end) / t_end
+    assert (found.intervals[:, 0] < 0.0).all()
+    assert (found.intervals[:, 1] > 0.0).all()
+    assert found.exponents[0] < 2.0 * bound  # measured: 0.37, 0.62 and 0.72 times the bound
+    halves = np.diff(found.intervals)[:, 0] / 2.0
+    assert (halves < 4.0 * bound).all()  # measured: 1.3 to 2.2 times
+    assert (halves > bound).all()
 
 
 def test_exponents_of_gauss_come_in_pairs_on_a_hamiltonian():
@@ -72,6 +171,7 @@ def test_rounds_that_were_too_long_are_repeated(monkeypatch):
     assert np.abs(found.exponents * found.time - [exact, -exact]).max() < 1e-8  # measured: 5e-11
     assert found.rounds > 2048  # measured: 2081
     assert repeated
+    assert abs(found.divergence) < 1e-15
 
 
 def test_too_much_growth_in_one_step_is_refused():

@@ -47,6 +47,8 @@ class Measured:
         Of whole runs after compiling.
     others, stolen : float
         What else the machine did meanwhile, as shares of one core's time.
+    divergence : float or None
+        The mean of the field's divergence along our trajectory; ``None`` in results that are older.
     """
 
     exponents: Array
@@ -58,6 +60,7 @@ class Measured:
     heyoka_seconds: list[float]
     others: float
     stolen: float
+    divergence: float | None = None
 
 
 def measured(name: str, share: float = 1.0, samples: int = SAMPLES) -> Measured:
@@ -96,6 +99,7 @@ def measured(name: str, share: float = 1.0, samples: int = SAMPLES) -> Measured:
         heyoka_seconds=seconds[1],
         others=load.others if load else 0.0,
         stolen=load.stolen if load else 0.0,
+        divergence=mine.divergence,
     )
 
 

@@ -324,7 +324,8 @@ def _times(measured: dict[str, exponents.Measured]) -> Table:
     rows = []
     for name, here in measured.items():
         known, load_ = SYSTEMS[name], (here.others, here.stolen)
-        off = NONE if known.divergence is None else f"{abs(here.sum - known.divergence):.0e}"
+        divergence = known.divergence if here.divergence is None else here.divergence
+        off = NONE if divergence is None else f"{abs(here.sum - divergence):.0e}"
         rows.append(
             (
                 known.title,
@@ -344,8 +345,9 @@ def _times(measured: dict[str, exponents.Measured]) -> Table:
             *("time, ours", "time, heyoka"),
         ),
         rows,
-        "Sum off by: the sum of our exponents less the divergence of the field, where that is a constant. "
-        "Times: median of whole runs with all exponents, without compiling."
+        "Sum off by: the sum of our exponents less the mean divergence of the field along the trajectory. "
+        "Times: median of whole runs with all exponents, without compiling; where the divergence is not "
+        "constant, ours contain its integration."
         + _busy([max(here.others, here.stolen) for here in measured.values()]),
         words=(0,),
         key="exponents-times",

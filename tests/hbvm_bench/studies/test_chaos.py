@@ -11,6 +11,7 @@ from hbvm_bench.campaign.shorter import quick_run
 from hbvm_bench.cli import main
 from hbvm_bench.studies.chaos import exponents, maps, orbits, report
 from hbvm_bench.studies.chaos.systems import SKIP, SYSTEMS
+from hbvm_bench.summaries.table import NONE
 from integrators import lyapunov
 from problems import emit
 
@@ -82,6 +83,15 @@ def test_times_on_a_busy_machine_are_not_judged():
     made = report._times({"lorenz": replace(quiet, others=0.5)})
     assert " ".join(made.rows[0]).count("(not judged)") == 2
     assert "at most 50%" in made.note
+
+
+def test_the_sum_is_compared_with_the_mean_divergence_where_that_is_not_constant():
+    older = made_up("rossler", 0.07, 0.07, -5.33)
+    assert report._times({"rossler": older}).rows[0][5] == NONE
+    newer = replace(older, divergence=-5.33 + 1e-12)
+    assert report._times({"rossler": newer}).rows[0][5] == "1e-12"
+    lorenz = made_up("lorenz", 0.9, 0.9, -41 / 3 + 1e-12)
+    assert report._times({"lorenz": lorenz}).rows[0][5] == "1e-12"
 
 
 def test_maps_tell_regular_from_chaotic_starts():
