@@ -3,10 +3,11 @@
 from integrators.dynamics.adjoint import gradient
 from integrators.dynamics.indicators import Indicator, finite_time_exponent, gali, megno, sali
 from integrators.dynamics.lyapunov import Exponents, lyapunov
-from integrators.dynamics.maps import IndicatorMap, indicator_map
+from integrators.dynamics.maps import ExponentMap, IndicatorMap, indicator_map, lyapunov_map
 from integrators.dynamics.orbits import PeriodicOrbit, continued, periodic
 
 __all__ = [
+    "ExponentMap",
     "Exponents",
     "Indicator",
     "IndicatorMap",
@@ -17,6 +18,7 @@ __all__ = [
     "gradient",
     "indicator_map",
     "lyapunov",
+    "lyapunov_map",
     "megno",
     "periodic",
     "sali",

@@ -68,6 +68,8 @@ class Exponents:
         The time T that they are averages over.
     rounds : int
         How many times the vectors were made orthonormal.
+    steps : int
+        How many there were, those of repeated rounds among them.
     status, reason
         How the integration ended; after a failure, the averages are those up to there.
     """
@@ -79,6 +81,7 @@ class Exponents:
     pairs: float | None
     time: float
     rounds: int
+    steps: int
     status: Status
     reason: str
 
@@ -147,34 +150,78 @@ def lyapunov(
     ((4,), True)
     """
     method = registry.create("HBVM") if method is None else method
+    return exponents_of(problem, method, *checked_span(problem, count, t_end, skip), skip)
+
+
+class NoAveragesError(InputError):
+    """There is too little of a trajectory for exponents.
+
+    Attributes
+    ----------
+    status : Status
+        How it ended.
+    steps : int
+        How many there were.
+    """
+
+    def __init__(self, text: str, status: Status, steps: int):
+        super().__init__(text)
+        self.status, self.steps = status, steps
+
+
+def checked_span(problem: Problem, count: int | None, t_end: float | None, skip: float) -> tuple[int, float]:
+    """Return how many exponents of a problem are asked for, and where its integration ends.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For more exponents than components, and a time that is too short.
+    """
     system, end = problem.system, problem.t_end if t_end is None else t_end
     n = system.dim if count is None else count
     if n > system.dim:
         raise InputError(f"count={n} is more than the {system.dim} components of {system.name}.")
     if not problem.t0 + skip < end or skip < 0.0:
         raise InputError(f"t_end={end!r} leaves no time after t0={problem.t0!r} and skip={skip!r}.")
-    stepper = with_variations(problem, method)
-    frame, none = _frame(system.dim, system.dof)[:, :n], np.zeros((system.n_par, n))
-    marks = np.linspace(problem.t0, end, INTERVALS + 1)[1:]
-    if np.count_nonzero(marks >= problem.t0 + skip) <= 2 * WAVES:
+    if np.count_nonzero(_marks(problem, end) >= problem.t0 + skip) <= 2 * WAVES:
         raise InputError(f"skip={skip!r} leaves too little of the time for intervals; give a later t_end.")
-    course = _Rounds(stepper, frame, none)
+    return n, end
+
+
+def exponents_of(problem: Problem, method: MethodBase, n: int, end: float, skip: float) -> Exponents:
+    """Return the exponents of a trajectory, of arguments that `checked_span` has checked.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For a method without variations; a `NoAveragesError` where there is too little of the trajectory.
+    """
+    system, start, marks = problem.system, problem.t0 + skip, _marks(problem, end)
+    stepper = with_variations(problem, method)
+    course = _Rounds(stepper, _frame(system.dim, system.dof)[:, :n], np.zeros((system.n_par, n)))
     status, reason = course.through(marks)
-    counted = np.isfinite(course.times)
+    counted, steps = np.isfinite(course.times), stepper.stats.steps
     times, growth = course.times[counted], course.growth[counted]
-    if np.count_nonzero(times >= problem.t0 + skip) <= 2 * WAVES:
+    if np.count_nonzero(times >= start) <= 2 * WAVES:
         why = reason or "give a later t_end or shorter steps."
-        raise InputError(f"there are too few steps after skip={skip!r} for intervals: {why}")
+        text = f"there are too few steps after skip={skip!r} for intervals: {why}"
+        raise NoAveragesError(text, status if status.failed else Status.NOT_FINITE, steps)
     canonical = system.dof is not None and n == system.dim
-    exponents, intervals, pairs, time = _averaged(problem.t0 + skip, times, growth, canonical)
+    exponents, intervals, pairs, time = _averaged(start, times, growth, canonical)
     divergence = None
     if n == system.dim:
-        begin = int(np.searchsorted(times, problem.t0 + skip))
+        begin = float(times[np.searchsorted(times, start)])
         again = with_variations(problem, method)
-        divergence = mean_divergence(problem, again, float(times[begin]), float(times[-1]), marks)
+        divergence = mean_divergence(problem, again, begin, float(times[-1]), marks)
     return Exponents(
-        exponents, intervals, float(exponents.sum()), divergence, pairs, time, course.rounds, status, reason
-    )
+        exponents, intervals, float(exponents.sum()), divergence, pairs, time, course.rounds, steps, status,
+        reason,
+    )  # fmt: skip
+
+
+def _marks(problem: Problem, end: float) -> Array:
+    """Return the ends of the intervals."""
+    return np.linspace(problem.t0, end, INTERVALS + 1)[1:]
 
 
 class _Rounds:
@@ -222,7 +269,11 @@ class _Rounds:
                 if not extent <= LIMIT:
                     if taken == 1:
                         where = f"in the step to t = {stepper.t!r}"
-                        raise InputError(f"{where} vectors grow too differently; take shorter steps.")
+                        raise NoAveragesError(
+                            f"{where} vectors grow too differently; take shorter steps.",
+                            Status.NOT_FINITE,
+                            stepper.stats.steps,
+                        )
                     most, passed = min(most, taken // 2), max(passed, stepper.t)
                     i = self._back_to(saved)
                     continue

@@ -1,6 +1,6 @@
-"""Indicators of chaos over many starts or parameters."""
+"""Indicators of chaos, and Lyapunov exponents, over many starts or parameters."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from dataclasses import dataclass
@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from integrators import registry
 from integrators.dynamics.indicators import SAMPLES, Indicator, finite_time_exponent, gali, megno, sali
+from integrators.dynamics.lyapunov import NoAveragesError, checked_span, exponents_of
 from integrators.options import Count
 from integrators.protocol import Array, MethodBase, Status, check_problem
 from integrators.running.integrate import SECONDS, NotNegative
@@ -51,6 +52,42 @@ class IndicatorMap:
     """
 
     values: Array
+    status: list[Status]
+    reason: list[str]
+    starts: Array
+    par: Array
+    warning: str
+
+
+@dataclass(frozen=True, eq=False)
+class ExponentMap:
+    """Lyapunov exponents of many trajectories.
+
+    Attributes
+    ----------
+    exponents : ndarray, shape (n, count)
+        Of each, in 1/time, the largest first; NaN where it did not get to its end.
+    intervals : ndarray, shape (n, count, 2)
+        Each with 95 % confidence, or a bound of convergence, as in `Exponents`.
+    sum, divergence, pairs : ndarray, shape (n,)
+        As in `Exponents`; NaN where that has ``None``.
+    status : list of Status
+        How each ended.
+    reason : list of str
+        A sentence on each failure, else empty.
+    starts : ndarray, shape (n, dim)
+        Their starts.
+    par : ndarray, shape (n, n_par)
+        Their parameters.
+    warning : str
+        Why the last checkpoint was not written, if it was not.
+    """
+
+    exponents: Array
+    intervals: Array
+    sum: Array
+    divergence: Array
+    pairs: Array
     status: list[Status]
     reason: list[str]
     starts: Array
@@ -139,56 +176,195 @@ def indicator_map(
         raise unknown("indicator", indicator, tuple(INDICATORS))
     if k is not None and indicator != "gali":
         raise InputError(f"k={k} is the order of indicator='gali'; leave it out for {indicator!r}.")
-    if not callable(progress) and not isinstance(progress, bool):
-        raise InputError(f"progress={shown(progress)} must be True, False or a function of the progress.")
-    rows, par = members("indicator_map", problem, starts, parameters)
     options: dict[str, Any] = {"t_end": t_end, "samples": samples} | ({} if k is None else {"k": k})
-    n = len(rows)
-    state: dict[str, Any] = {
-        "values": np.full(n, np.nan),
-        "status": [Status.INTERRUPTED] * n,
-        "reason": ["Ctrl-C was pressed before it was at its end."] * n,
-        "made": 0,
-        "steps": 0,
-    }
-    told = np.concatenate([rows.ravel(), par.ravel()])
-    belongs = identity(problem, method, told, f"{indicator} {options}", {})
-    path = None if checkpoint is None else Path(checkpoint)
-    earlier = None if resume is None else Path(resume)
-    if earlier is not None and (earlier != path or earlier.exists()):
-        state = read(earlier, belongs)
-    value = partial(_value, problem, INDICATORS[indicator], method, options)
-    with Bar() if progress is True else nullcontext(progress or None) as report:
-        watch = Watch(0.0, float(n), report, path, every_seconds, belongs)
-        try:
-            with ThreadPoolExecutor(threads) as pool:
-                while (first := state["made"]) < n:
-                    count = threads if first else 1  # the first compiles what all need
-                    here = slice(first, first + count)
-                    results = list(pool.map(value, rows[here], par[here]))
-                    state["values"][here] = [
-                        each.value if not each.status.failed else np.nan for each in results
-                    ]
-                    state["status"][here] = [each.status for each in results]
-                    state["reason"][here] = [each.reason for each in results]
-                    state["made"] = first + len(results)
-                    state["steps"] += sum(each.steps for each in results)
-                    watch.keep(state)
-                    watch.look(float(state["made"]), state["steps"])
-        except KeyboardInterrupt:
-            pass
-        watch.write()
-    return IndicatorMap(state["values"], state["status"], state["reason"], rows, par, watch.failure)
+    rows, par = members("indicator_map", problem, starts, parameters)
+    value = partial(_indicator, INDICATORS[indicator], method, options)
+    belongs = identity(problem, method, _told(rows, par), f"{indicator} {options}", {})
+    loop = _Loop(threads, progress, checkpoint, every_seconds, resume, belongs)
+    state, failure = loop.over(problem, rows, par, value, ())
+    return IndicatorMap(state["values"], state["status"], state["reason"], rows, par, failure)
 
 
-def _value(
+@checked_arguments
+def lyapunov_map(
     problem: Problem,
-    function: Callable[..., Indicator],
-    method: MethodBase,
-    options: Any,
-    y0: Array,
-    par: Array,
-) -> Indicator:
+    method: MethodBase | None = None,
+    *,
+    starts: ArrayLike | None = None,
+    parameters: Named[ArrayLike] = NOTHING,
+    count: Annotated[int, at_least(1)] | None = None,
+    t_end: float | None = None,
+    skip: float = 0.0,
+    threads: Count = 1,
+    progress: bool | Report = False,
+    checkpoint: File | None = None,
+    every_seconds: NotNegative = SECONDS,
+    resume: File | None = None,
+) -> ExponentMap:
+    """Return Lyapunov exponents with intervals for many starts, or values of parameters.
+
+    Every trajectory is integrated by itself, as many at once as there are threads; a grid is a list of its
+    points here.
+
+    Parameters
+    ----------
+    problem : Problem
+        What to integrate; traced.
+    method : MethodBase, optional
+        `Gauss` or `HBVM`; by default ``HBVM()``.
+    starts, parameters
+        As in `integrators.integrate_many`.
+    count, t_end, skip
+        As in `integrators.lyapunov`.
+    threads, progress, checkpoint, every_seconds, resume
+        As in `indicator_map`.
+
+    Returns
+    -------
+    ExponentMap
+        After Ctrl-C, which waits for the trajectories under way, with the status ``INTERRUPTED`` for the
+        others.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For a method or a system without variations, more exponents than components, and starts, parameters,
+        times or files that cannot be used.
+
+    Examples
+    --------
+    >>> import problems
+    >>> from integrators import Gauss
+    >>> from integrators.dynamics import lyapunov_map
+    >>> starts = [[0.0, 0.1, 0.1, 0.0], [0.0, 0.5, 0.35611546, 0.19454676]]
+    >>> henon_heiles, method = problems.load("henon_heiles"), Gauss(s=6, h=0.25)
+    >>> found = lyapunov_map(henon_heiles, method, starts=starts, count=1, t_end=1000.0)
+    >>> (found.intervals[:, 0, 0] > 0.0).tolist()
+    [False, True]
+    """
+    method = registry.create("HBVM") if method is None else method
+    check_problem(problem, method)
+    n, end = checked_span(problem, count, t_end, skip)
+    rows, par = members("lyapunov_map", problem, starts, parameters)
+    value = partial(_exponents, method, n, end, skip)
+    belongs = identity(problem, method, _told(rows, par), f"lyapunov {(n, end, skip)}", {})
+    loop = _Loop(threads, progress, checkpoint, every_seconds, resume, belongs)
+    state, failure = loop.over(problem, rows, par, value, (3 * n + 3,))
+    exponents, low, high, checks = np.split(state["values"], [n, 2 * n, 3 * n], axis=1)
+    return ExponentMap(
+        exponents=exponents,
+        intervals=np.stack([low, high], axis=2),
+        sum=checks[:, 0],
+        divergence=checks[:, 1],
+        pairs=checks[:, 2],
+        status=state["status"],
+        reason=state["reason"],
+        starts=rows,
+        par=par,
+        warning=failure,
+    )
+
+
+Outcome = tuple[ArrayLike, Status, str, int]
+"""The values of one trajectory, how it ended with the reason, and how many steps it took."""
+
+
+@dataclass(frozen=True)
+class _Loop:
+    """How many trajectories are followed: the arguments that every map has, and what its file belongs to."""
+
+    threads: int
+    progress: bool | Report
+    checkpoint: Any
+    every_seconds: float
+    resume: Any
+    belongs: Mapping[str, str]
+
+    def over(
+        self,
+        problem: Problem,
+        rows: Array,
+        par: Array,
+        value: Callable[[Problem], Outcome],
+        shape: tuple[int, ...],
+    ) -> tuple[dict[str, Any], str]:
+        """Return the values of all, one in each row, and their ends; and why no file was written.
+
+        Parameters
+        ----------
+        problem : Problem
+            With another start and other parameters for each.
+        rows, par : ndarray, shapes (n, dim), (n, n_par)
+            These.
+        value : callable
+            What makes the values of one.
+        shape : tuple of int
+            Of the values of one.
+        """
+        progress, n = self.progress, len(rows)
+        if not callable(progress) and not isinstance(progress, bool):
+            raise InputError(f"progress={shown(progress)} must be True, False or a function of the progress.")
+        state: dict[str, Any] = {
+            "values": np.full((n, *shape), np.nan),
+            "status": [Status.INTERRUPTED] * n,
+            "reason": ["Ctrl-C was pressed before it was at its end."] * n,
+            "made": 0,
+            "steps": 0,
+        }
+        path = None if self.checkpoint is None else Path(self.checkpoint)
+        earlier = None if self.resume is None else Path(self.resume)
+        if earlier is not None and (earlier != path or earlier.exists()):
+            state = read(earlier, self.belongs)
+
+        def of_one(y0: Array, values: Array) -> Outcome:
+            parameters: Any = problem.system.unpack(values)
+            return value(problem.replace(y0=y0, parameters=parameters))
+
+        with Bar() if progress is True else nullcontext(progress or None) as report:
+            watch = Watch(0.0, float(n), report, path, self.every_seconds, self.belongs)
+            try:
+                with ThreadPoolExecutor(self.threads) as pool:
+                    while (first := state["made"]) < n:
+                        count = self.threads if first else 1  # the first compiles what all need
+                        here = slice(first, first + count)
+                        values, status, reason, steps = zip(
+                            *pool.map(of_one, rows[here], par[here]), strict=True
+                        )
+                        state["values"][here] = values
+                        state["status"][here] = status
+                        state["reason"][here] = reason
+                        state["made"] = first + len(status)
+                        state["steps"] += sum(steps)
+                        watch.keep(state)
+                        watch.look(float(state["made"]), state["steps"])
+            except KeyboardInterrupt:
+                pass
+            watch.write()
+        return state, watch.failure
+
+
+def _told(rows: Array, par: Array) -> Array:
+    """Return what a file says of the trajectories."""
+    return np.concatenate([rows.ravel(), par.ravel()])
+
+
+def _indicator(
+    function: Callable[..., Indicator], method: MethodBase, options: Any, problem: Problem
+) -> Outcome:
     """Return the indicator of one trajectory."""
-    parameters: Any = problem.system.unpack(par)
-    return function(problem.replace(y0=y0, parameters=parameters), method, **options)
+    found = function(problem, method, **options)
+    return np.nan if found.status.failed else found.value, found.status, found.reason, found.steps
+
+
+def _exponents(method: MethodBase, n: int, end: float, skip: float, problem: Problem) -> Outcome:
+    """Return the exponents, both ends of their intervals, sum, divergence and pairs of one trajectory."""
+    nothing = np.full(3 * n + 3, np.nan)
+    try:
+        found = exponents_of(problem, method, n, end, skip)
+    except NoAveragesError as error:
+        return nothing, error.status, str(error), error.steps
+    if found.status.failed:
+        return nothing, found.status, found.reason, found.steps
+    checks = [np.nan if check is None else check for check in (found.sum, found.divergence, found.pairs)]
+    values = np.concatenate([found.exponents, *found.intervals.T, checks])
+    return values, found.status, found.reason, found.steps

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import problems
-from integrators import HBVM, Gauss
-from integrators.dynamics import lyapunov
+from integrators import HBVM, Gauss, Status
+from integrators.dynamics import lyapunov, lyapunov_map
 from integrators.dynamics.lyapunov import _Rounds
 from problems import InputError, Problem, VectorField
 
@@ -232,6 +232,78 @@ def test_intervals_of_another_mixing_system_cover_the_mean_of_all():
     covered = sum(each.intervals[0, 0] < mean < each.intervals[0, 1] for each in found)
     assert 2.0 < mean < 2.3  # measured: 2.148
     assert 88 <= covered <= 100  # 95 with a standard deviation of 2.2; measured: 98
+
+
+RING = VectorField(
+    lambda y, par: [(y[(i + 1) % 5] - y[i - 2]) * y[i - 1] - y[i] + par.F for i in range(5)],
+    dim=5,
+    parameters={"F": 10.0},
+)
+SHORT = {"count": 2, "t_end": 60.0, "skip": 10.0}
+
+
+def test_a_map_has_the_exponents_of_its_parameters():
+    problem, forces = Problem(RING, y0=[1.0, 2.0, 3.0, 4.0, 5.0], t_end=60.0), [6.0, 8.0, 10.0]
+    for threads in (1, 2):
+        found = lyapunov_map(
+            problem, Gauss(s=4, h=0.05), parameters={"F": forces}, skip=10.0, threads=threads
+        )
+        for i, force in enumerate(forces):
+            alone = lyapunov(problem.replace(parameters={"F": force}), Gauss(s=4, h=0.05), skip=10.0)
+            assert np.array_equal(found.exponents[i], alone.exponents)
+            assert np.array_equal(found.intervals[i], alone.intervals)
+            assert (found.sum[i], found.divergence[i]) == (alone.sum, -5.0)
+        assert np.isnan(found.pairs).all()
+        assert found.status == [Status.FINISHED] * 3
+        assert found.exponents.shape == (3, 5)
+
+
+def test_a_map_that_was_broken_off_goes_on(tmp_path):
+    def stop(progress):
+        if progress.t >= 2:
+            raise KeyboardInterrupt
+
+    starts = np.random.default_rng(0).uniform(0.0, 5.0, (4, 5))
+    problem, method, file = Problem(RING, y0=starts[0], t_end=60.0), Gauss(s=4, h=0.05), tmp_path / "file"
+    whole = lyapunov_map(problem, method, starts=starts, **SHORT)
+    broken = lyapunov_map(problem, method, starts=starts, **SHORT, checkpoint=file, progress=stop)
+    assert np.isnan(broken.exponents[:, 0]).tolist() == [False, False, True, True]
+    assert broken.status[2:] == [Status.INTERRUPTED] * 2
+    seen = []
+    resumed = lyapunov_map(
+        problem, method, starts=starts, **SHORT, resume=file, progress=lambda p: seen.append(p.t)
+    )
+    assert seen == [3.0, 4.0]
+    assert np.array_equal(resumed.exponents, whole.exponents)
+    assert np.array_equal(resumed.intervals, whole.intervals)
+    assert whole.intervals.shape == (4, 2, 2)
+    assert np.isnan(whole.divergence).all()
+    with pytest.raises(InputError, match="checkpoint"):
+        lyapunov_map(problem, method, starts=starts, **{**SHORT, "count": 1}, resume=file)
+
+
+def test_a_trajectory_that_fails_leaves_the_others_of_a_map():
+    system = VectorField(lambda y, par: [par.a * y[0] ** 2 - y[0], -y[1]], dim=2, parameters={"a": 0.1})
+    problem = Problem(system, y0=[1.0, 1.0], t_end=20.0)
+    found = lyapunov_map(problem, Gauss(s=4, h=0.01), parameters={"a": [0.1, 2.0]})
+    assert found.status[0] is Status.FINISHED
+    assert found.status[1].failed
+    assert found.reason[1]
+    assert np.isnan(found.exponents).tolist() == [[False] * 2, [True] * 2]
+    growing = VectorField(lambda y, par: [par.a * y[0], y[1]], dim=2, parameters={"a": 0.1})
+    problem = Problem(growing, y0=[0.0, 0.0], t_end=1e3)
+    steep = 4.0 * (1.0 - 1e-11)  # as for a single trajectory above
+    found = lyapunov_map(problem, Gauss(s=1, h=0.5), parameters={"a": [0.1, steep]})
+    assert found.status == [Status.FINISHED, Status.NOT_FINITE]
+    assert "take shorter steps" in found.reason[1]
+
+
+def test_what_a_map_cannot_be_is_said():
+    problem = problems.load("pendulum")
+    with pytest.raises(InputError, match="count=3"):
+        lyapunov_map(problem, Gauss(s=4, h=0.1), starts=[[1.0, 0.0]], count=3)
+    with pytest.raises(InputError, match="lyapunov_map needs starts"):
+        lyapunov_map(problem, Gauss(s=4, h=0.1))
 
 
 def test_too_many_exponents_are_refused():
