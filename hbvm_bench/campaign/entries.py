@@ -84,10 +84,14 @@ class Checks(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         and perturbed ones; see `hbvm_bench.measure.starts`. 0: no law is sought.
     reversal : float
         Share of the span that is integrated there and back again; 0: none.
+    chaos : bool
+        Whether MEGNO and the largest Lyapunov exponent are computed, by the derivatives of the method's
+        steps; of a single trajectory.
     """
 
     starts: Annotated[int, Meta(ge=0, le=1000)] = 0
     reversal: Annotated[float, Meta(ge=0, le=1)] = 0.0
+    chaos: bool = False
 
 
 class Ensemble(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):

@@ -34,6 +34,7 @@ from problems.problem import Problem
 OWN_PACKAGES = ("problems", "integrators", "hbvm_bench")
 KERNEL = "integrators.kernel"
 INTEGRATES = "hbvm_bench.measure.raw"  # what a worker process integrates a case with
+CHAOS = "hbvm_bench.measure.chaos"  # and what it computes indicators of chaos with, where these are asked for
 # They say, name and keep what is run; all that an integration can depend on of it is in the key. A
 # reference is what it is compared with when it is read.
 BOOKKEEPING = (
@@ -212,7 +213,8 @@ def source_digest(method: MethodBase, case: Case) -> str:
     """
     spec = parse_spec(case.problem)
     made_in = [] if own.find(spec) else [problems.registry.factory(spec.name).__module__]
-    return digest_of((INTEGRATES, type(method).__module__, *made_in))
+    asked = [CHAOS] if case.checks.chaos else []
+    return digest_of((INTEGRATES, type(method).__module__, *made_in, *asked))
 
 
 @cache

@@ -57,6 +57,8 @@ class Measured:
     # what the laws were found from: ``t`` of shape (n,), and the errors by invariant, of shape (starts, n)
     drift: dict[str, Array] = field(default_factory=dict)
     reversal: float | str = "not asked for"  # distance from the start after integrating there and back
+    # MEGNO, the exponent and its interval by the names of `hbvm_bench.measure.chaos`, or why there is none
+    chaos: dict[str, Array | str] = field(default_factory=dict)
     extra: dict[str, Array] = field(default_factory=dict)
 
     def series(self) -> dict[str, Array]:
@@ -94,6 +96,7 @@ def measure(
         trajectories=result.trajectories,
         peak_gib=result.peak_gib,
         reversal=_reversal(problem, result, series),
+        chaos={**result.chaos, **_named(series, "chaos.")},
         extra=_named(series, "extra."),
     )
     # an overflow is a result here: it becomes a sentence in the metrics

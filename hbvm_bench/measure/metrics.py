@@ -176,6 +176,38 @@ def reversal(m: Measured) -> float | str:
     return m.reversal
 
 
+@metric("MEGNO", "MEGNO", "", better=None, scale="linear", same_trajectory=True)
+def megno(m: Measured) -> float | str:
+    """Mean exponential growth factor of nearby orbits at the end, from the derivatives of the method's
+    steps: near 2 for regular motion, half the largest Lyapunov exponent times the time for chaotic motion.
+    """
+    return _of_chaos(m, "megno")
+
+
+@metric("largest Lyapunov exponent", "exponent", "1/time", better=None, scale="linear", same_trajectory=True)
+def exponent(m: Measured) -> float | str:
+    """Largest Lyapunov exponent over the span, from the derivatives of the method's steps."""
+    return _of_chaos(m, "exponent")
+
+
+@metric(
+    "lower end of the exponent's interval", "exponent, low", "1/time",
+    better=None, scale="linear", same_trajectory=True,
+)  # fmt: skip
+def exponent_low(m: Measured) -> float | str:
+    """Lower end of the 95 % interval of the largest Lyapunov exponent: above 0, the motion is chaotic."""
+    return _of_chaos(m, "exponent", 1)
+
+
+@metric(
+    "upper end of the exponent's interval", "exponent, high", "1/time",
+    better=None, scale="linear", same_trajectory=True,
+)  # fmt: skip
+def exponent_high(m: Measured) -> float | str:
+    """Upper end of the 95 % interval of the largest Lyapunov exponent."""
+    return _of_chaos(m, "exponent", 2)
+
+
 @metric("off-axis distance", "off axis", "length")
 def guard_max(m: Measured) -> float | str:
     """Largest value of what the problem's symmetry keeps at exactly 0 (Sitnikov: the
@@ -308,6 +340,12 @@ def _error_max(m: Measured, invariant: str) -> float | str:
     if invariant not in m.errors:
         return f"the problem declares no {invariant.replace('_', ' ')}"
     return _largest(m.errors[invariant], m.t)
+
+
+def _of_chaos(m: Measured, name: str, place: int = 0) -> float | str:
+    """Return a number of what `hbvm_bench.measure.chaos` stored under a name."""
+    value = m.chaos.get(name, "not asked for")
+    return value if isinstance(value, str) else float(value[place])
 
 
 def _of_law(m: Measured, name: str) -> float | str:

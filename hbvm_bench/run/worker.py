@@ -144,10 +144,21 @@ def _measure(request: Request, directory: Path) -> Result:
     result, series = raw.of_solution(solution)
     try:
         reversal, more = raw.beside(solution, program, resolved.case.checks)
+        reasons, indicators = _chaos(resolved)
     except Exception as error:
         traceback.print_exc()
         return Result(outcome="crashed", reason=f"in a check, {type(error).__name__}: {error}")
-    return _stored(directory, msgspec.structs.replace(result, reversal=reversal), series | more)
+    result = msgspec.structs.replace(result, reversal=reversal, chaos=reasons)
+    return _stored(directory, result, series | more | indicators)
+
+
+def _chaos(resolved: Resolved) -> tuple[dict[str, str], Series]:
+    """Return the indicators of chaos that a case asks for, and why one is missing."""
+    if not resolved.case.checks.chaos:
+        return {}, {}
+    from hbvm_bench.measure import chaos  # as the numbers of no other case depend on it
+
+    return chaos.beside(resolved.problem, resolved.method)
 
 
 def _stored(directory: Path, result: Result, series: Series) -> Result:

@@ -280,6 +280,9 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
         What the solution says of itself although it did not fail.
     reversal : Value
         Why there is no way back; without a reason the series have where it arrived.
+    chaos : dict
+        Why there is no ``megno`` and no ``exponent``, where they were asked for; what there is, is in the
+        series.
     peak_gib : float or None
         Largest resident memory of the process.
     trajectories : int
@@ -298,6 +301,7 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
     trajectories: int = 1
     warnings: list[str] = []
     reversal: Value = Value(why="not asked for")
+    chaos: dict[str, str] = {}
     peak_gib: float | None = None
 
 

@@ -362,6 +362,9 @@ def damage(record: Record, series: Mapping[str, NDArray[np.float64]], dim: int) 
         return "the states of its further starts do not belong to its times"
     if "reversal.y" in series and series["reversal.y"].shape != (1, dim):
         return f"its way back ends in the shape {series['reversal.y'].shape}"
+    sizes = {"chaos.megno": (1,), "chaos.exponent": (3,)}
+    if wrong := [name for name, size in sizes.items() if name in series and series[name].shape != size]:
+        return f"{wrong[0]} has the shape {series[wrong[0]].shape}"
     witnesses = series.get("witness.index", np.empty(0))
     if not np.all((witnesses >= 0) & (witnesses < t.size)) or any(
         getattr(series.get(f"witness.{part}"), "shape", ()) != (witnesses.size, dim)

@@ -166,6 +166,7 @@ RIGHT\n[checks]\nreversal = 2                                => Expected `float`
 RIGHT\n[checks]\nreversal = -0.1                             => Expected `float` >= 0.0, at `checks.reversal`
 RIGHT\n[checks]\nreversal = "a"                              => Expected `float`, got `str`, at
 RIGHT\n[checks]\nreversal = nan                              => Expected `float` >= 0.0, at `checks.reversal`
+RIGHT\n[checks]\nchaos = 1                                  => Expected `bool`, got `int`, at `checks.chaos`
 RIGHT\n[checks]\nstart = 3                                   => unknown key 'start'; did you mean 'starts'?
 RIGHT\n[limits]\nmemory_gib = 1e-6                            => memory_gib=1e-06 of limits is too little for
 RIGHT\n[limits]\nwall_seconds = 1e-6                          => wall_seconds=1e-06 of limits is too little fo

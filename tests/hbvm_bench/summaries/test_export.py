@@ -29,7 +29,10 @@ def test_json_has_the_grid_the_checks_and_the_ensemble_with_their_defaults(recor
     one, small, large = json.loads(json_of(export.as_json(records)))["cases"]
     assert one["grid"]["step"] == 25.0
     assert one["grid"]["spacing"] == small["grid"]["spacing"] == "equal"
-    assert (one["checks"], one["ensemble"]) == ({"starts": 4, "reversal": 0.0}, None)
+    assert (one["checks"], one["ensemble"]) == (
+        {"starts": 4, "reversal": 0.0, "chaos": False},
+        None,
+    )
     assert small["ensemble"] == {"count": 10, "spread": 1e-2, "vary": [["e", 0.1]]}
     assert large["ensemble"]["count"] == 20
     assert (one["problem"], one["settings"], one["note"]) == ("sitnikov(e=0.75)", "chosen", "")
