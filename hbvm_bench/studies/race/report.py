@@ -143,7 +143,14 @@ def run_again(results: Results) -> Section:
 def section(race: Race, look: Mapping[str, Look], nav: str) -> Section:
     """Return what the report says about one contest, under a short name for the page's head."""
     title, problem = race.title, race.records[0].case.problem
-    shown = (tables.fastest, tables.compiled, tables.levels, tables.defaults, tables.compiling)
+    shown = (
+        tables.fastest,
+        tables.compiled,
+        tables.levels,
+        tables.positions,
+        tables.defaults,
+        tables.compiling,
+    )
     return Section(
         title,
         [

@@ -1,5 +1,6 @@
 """The tables of a race, as text cells: the terminal and both reports print these."""
 
+import math
 from collections.abc import Mapping, Sequence
 from statistics import median
 
@@ -9,7 +10,7 @@ from hbvm_bench.store.records import Record
 from hbvm_bench.studies.race.families import FAMILIES, OURS, Row
 from hbvm_bench.studies.race.probe import Probe
 from hbvm_bench.studies.race.results import ERRORS, Race, counts
-from hbvm_bench.summaries import compilations, outcomes, standings
+from hbvm_bench.summaries import accuracies, compilations, outcomes, standings
 from hbvm_bench.summaries.goals import ratio_text
 from hbvm_bench.summaries.goals import table as goals_table
 from hbvm_bench.summaries.rows import format_metric, group_of, seconds, status_of
@@ -195,28 +196,58 @@ def compiled(race: Race) -> Table | None:
 
 def levels(race: Race) -> Table:
     """Return the same at looser and tighter accuracy."""
+    pairs = [(energy, energy * POSITION_OVER_ENERGY) for energy in LEVELS]
+    return _at_levels(
+        race,
+        "At other accuracies",
+        "energy, position ≤",
+        {f"{power(energy)}, {power(position)}": (energy, position) for energy, position in pairs},
+    )
+
+
+def positions(race: Race) -> Table | None:
+    """Return the same at position errors from loose to tight; ``None`` where no setting reaches any."""
+    asked = {power(position): (math.inf, position) for position in accuracies.LEVELS}
+    reached = {
+        name: errors for name, errors in asked.items() if any(race.best(f, *errors) for f in race.families)
+    }
+    if not reached:
+        return None
+    return _at_levels(
+        race,
+        "By position error, whatever the energy error",
+        "position ≤",
+        reached,
+        "A level that no setting of any library reaches has no row.",
+    )
+
+
+def _at_levels(
+    race: Race, caption: str, head: str, asked: Mapping[str, tuple[float, float]], note: str = ""
+) -> Table:
+    """Return the fastest of HBVM and Gauss, and the other libraries relative to it, at several accuracies."""
     peers = [family for family in race.families if family != OURS]
     rows = []
-    for level in LEVELS:
-        position = level * POSITION_OVER_ENERGY
-        ours = race.best(OURS, level, position)
+    for name, errors in asked.items():
+        ours = race.best(OURS, *errors)
         rows.append(
             (
-                f"{power(level)}, {power(position)}",
+                name,
                 ours.case.method if ours else "not reached",
                 time_of(ours) if ours else NONE,
-                *(_level_cell(race.at(peer, level, position)) for peer in peers),
+                *(_level_cell(race.at(peer, *errors)) for peer in peers),
             )
         )
     return Table(
-        "At other accuracies",
+        caption,
         (
-            "energy, position ≤",
+            head,
             "fastest of HBVM and Gauss",
             "time",
             *(f"{FAMILIES[p].short} × HBVM and Gauss" for p in peers),
         ),
         rows,
+        note,
         words=(0, 1),
     )
 

@@ -129,6 +129,17 @@ def test_the_tables_say_why_there_is_no_ratio(race):
     assert cells["WHFast"] == "not reached"
 
 
+def test_times_stand_at_position_errors_from_loose_to_tight_whatever_the_energy_error(race):
+    table = tables.positions(race)
+    assert table is not None
+    assert [row[0] for row in table.rows] == ["1e-03", "1e-06", "1e-09", "1e-12"]
+    assert [row[1] for row in table.rows] == [*["Gauss(s=8, h=2.0)"] * 3, "not reached"]
+    taylor = table.head.index("heyoka × HBVM and Gauss")
+    cells = [row[taylor].split()[0] for row in table.rows]
+    assert cells == ["15.0×", "15.0×", "30.0×", "30"]  # the last, 30 ms, alone
+    assert tables.positions(replace(race, records=race.records[5:7])) is None  # none has a time
+
+
 def test_goals_are_listed_with_their_verdict(race):
     verdicts = {verdict.goal.against: verdict.verdict for verdict in race.goals}
     assert verdicts == {"Taylor": "reached", "IAS15": "missed", "WHFast": "reached"}
