@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 from html import escape
 from pathlib import Path
 
+from hbvm_bench.campaign.file import load, shipped
 from hbvm_bench.measure import machine
 from hbvm_bench.report import provenance
 from hbvm_bench.report.html import pages
@@ -28,6 +29,8 @@ LEAD = (
 WIDTH = 360  # pixels of a thumbnail
 DIGITS = 12  # of a digest
 LONGEST = 400  # characters of a description
+CHECKS = ("smoke",)  # campaigns that ask whether everything works, and have no report
+RACE, AVX2 = "race", "-avx2"  # how the kind of a processor ends, where code was restricted to AVX2
 
 
 def write_pages(directory: Path) -> Iterator[Path]:
@@ -61,6 +64,8 @@ def write_index(directory: Path) -> Path:
         raise InputError(f"the directory {str(directory)!r} holds no report; write one there first.")
     again = f"hbvm-bench report --index {plain(directory.resolve().name)}"
     measured = ["## When and where each was measured", printed(conditions(directory))]
+    if missing := not_measured(directory):
+        measured += ["## Not measured", "\n".join(f"- {plain(item)}" for item in missing)]
     text = "\n\n".join(["# Reports", LEAD, *parts, *measured, f"This list: `{again}`."]) + "\n"
     write_all({directory / "README.md": text.encode()})
     return directory / "README.md"
@@ -92,6 +97,31 @@ def conditions(directory: Path) -> Table:
         words=range(6),
         key="conditions",
     )
+
+
+def not_measured(directory: Path) -> list[str]:
+    """Return the campaigns of the package without a report here, and the race without its run on AVX2 alone.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If what is stored is damaged.
+    """
+    missing = [
+        f"{name}: {load(name).title}"
+        for name in shipped()
+        if name not in CHECKS and not _document(directory / name)
+    ]
+    kept = directory / RACE / archive.NAME
+    if _document(directory / RACE) and not any(kind.endswith(AVX2) for kind in _kinds(kept)):
+        missing.append(f"{RACE} --avx2: {load(RACE).title}, with AVX2 only")
+    return missing
+
+
+def _kinds(path: Path) -> list[str]:
+    """Return the kinds of processor whose results an archive holds; none without an archive."""
+    runs = [run.records() for run in archive.read(path)] if path.is_file() else []
+    return [machine.kind(Kept.machine_of(records)) for records in runs if records]
 
 
 def _measured(records: Sequence[Record]) -> tuple[str, ...]:

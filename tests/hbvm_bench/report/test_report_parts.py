@@ -10,12 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hbvm_bench.campaign.file import Campaign, MethodEntry
+from hbvm_bench.campaign.file import Campaign, MethodEntry, shipped
 from hbvm_bench.report import pack
 from hbvm_bench.report.document import Details
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace, numbers
 from hbvm_bench.report.figures.portraits import crossings
-from hbvm_bench.report.index import write_index
+from hbvm_bench.report.index import not_measured, write_index
 from hbvm_bench.report.markdown import markdown
 from hbvm_bench.report.page import document, gather
 from hbvm_bench.store.kept import Kept
@@ -138,6 +138,38 @@ def test_the_list_of_reports_says_when_and_where_each_was_measured(tmp_path):
     (tmp_path / "one" / "report.md").write_text("# A title\n", encoding="utf-8")
     row = "| one | 2026-01-02 | A, znver5-512bit | 0123456789ab | 2% to 30% | 0% to 1% |"
     assert row in write_index(tmp_path).read_text(encoding="utf-8")
+
+
+def test_the_list_of_reports_names_the_campaigns_that_have_none_and_a_race_without_its_run_on_avx2(tmp_path):
+    def measured(*built):
+        runs = []
+        for features in built:
+            timing = Timing(rounds=made_up_run.timed([1.0]), machine={"llvm_processor": "znver5"} | features)
+            record = made_up_run.record("HBVM()", problem="pendulum()", timing=timing)
+            runs.append(
+                Kept(
+                    index=Index(campaign=campaign, ids=[record.id], version="0", command=""), records=[record]
+                )
+            )
+        made_up_run.archived(tmp_path / "race", *runs)
+
+    campaign = Campaign(name="race", problems=["pendulum()"], methods=[MethodEntry(use="HBVM()")])
+    for name in {*shipped()} - {"drift", "large", "smoke"}:
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "report.md").write_text("# A title\n", encoding="utf-8")
+    avx2 = "race --avx2: The race: time at equal accuracy, with AVX2 only"
+    missing = ["drift: Conservation in long integrations", "large: Large systems"]
+    assert not_measured(tmp_path) == [*missing, avx2]  # no archive
+    measured({})
+    assert not_measured(tmp_path) == [*missing, avx2]
+    assert "## Not measured\n\n- drift: Conserv" in write_index(tmp_path).read_text(encoding="utf-8")
+    measured({}, {"ours_built_for": "AVX2"})
+    assert not_measured(tmp_path) == missing
+    for name in ("drift", "large"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "report.md").write_text("# A title\n", encoding="utf-8")
+    assert not_measured(tmp_path) == []
+    assert "Not measured" not in write_index(tmp_path).read_text(encoding="utf-8")
 
 
 def test_a_directory_without_reports_has_no_list(tmp_path):
