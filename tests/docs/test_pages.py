@@ -9,6 +9,7 @@ import matplotlib as mpl
 import matplotlib.pyplot as plt
 import pytest
 
+from hbvm_bench.campaign.file import shipped
 from tests.docs import pages
 
 EXECUTED = [path for path in pages.sources() if pages.cells(path)]
@@ -46,6 +47,12 @@ def test_every_file_of_the_repository_that_a_page_names_is_there(page):
         "docs/_build/html/index.html",  # what `make docs` builds
     }
     assert [name for name in named if name not in examples and not (pages.ROOT / name).is_file()] == []
+
+
+def test_every_shipped_campaign_has_a_budget_of_time():
+    text = (pages.DOCS / "developers" / "release.md").read_text(encoding="utf-8")
+    budgets = re.findall(r"^\| ([\w-]+) \| (\d+)", text, re.MULTILINE)
+    assert {name for name, _ in budgets} >= {*shipped()}
 
 
 def test_the_example_of_the_first_page_is_true():
