@@ -178,7 +178,7 @@ class Stats:
     evaluations : int or None
         Evaluations of the vector field at one state.
     iterations : int or None
-        Iterations of the nonlinear solver, over all steps.
+        Iterations of the nonlinear solver, over all steps, partial ones included.
     solver : str or None
         Which nonlinear solver did the work.
     extra : dict

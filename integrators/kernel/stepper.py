@@ -288,12 +288,15 @@ class HBVMStepper(ABC):
     def stats(self) -> Stats:
         """Counters of the work done.
 
-        ``extra`` holds: partial steps made; restarts from a bad extrapolation;
+        ``extra`` holds: partial steps made, and what of the iterations and evaluations was theirs
+        (``"partial_iterations"``, ``"partial_evaluations"``: the iterations that are left do not depend on
+        how many states between steps were asked for); restarts from a bad extrapolation;
         ``"lanes"``, whether the field runs on all stages at once; ``"form"``, whether
         stages hold the positions only ("second") or the whole state ("first"); and, once
         there is an implicit solver, ``"implicit"``, a dict: steps that it solved, times
         that it took over, Jacobians (and whether they are "traced" or by "differences"),
-        factorizations, rescues of steps that a fixed Jacobian could not solve. With several
+        factorizations, corrections, what of the Jacobians and corrections partial steps took,
+        rescues of steps that a fixed Jacobian could not solve. With several
         invariants also ``"lost"``, how often one had moved in a step by more than rounding
         accounts for (k is then too small), and ``"left_out"``, the names of those that follow
         from others. With adaptive step size also the method's ``"k"`` and ``"s"`` and, where the field
@@ -311,6 +314,8 @@ class HBVMStepper(ABC):
         ctx, kept, counters = self._context, self._program.kept, self._context.counters.numbers
         extra: dict[str, Any] = {
             "partial_steps": counters.partial_steps,
+            "partial_iterations": counters.partial_iterations,
+            "partial_evaluations": counters.partial_evaluations,
             "restarts": counters.restarts,
             "lanes": self._program.lanes,
             "form": "second" if self._program.second else "first",

@@ -241,8 +241,11 @@ class AdaptiveStepper(HBVMStepper):
 
     def _charge(self, scout: "AdaptiveStepper") -> None:
         """Count the work of a trajectory that looks ahead as this one's."""
-        self._context.counters.evaluations += scout.stats.evaluations or 0
-        self._context.counters.iterations += scout.stats.iterations or 0
+        counters, work = self._context.counters, scout.stats
+        counters.evaluations += work.evaluations or 0
+        counters.iterations += work.iterations or 0
+        counters.partial_evaluations += work.extra["partial_evaluations"]
+        counters.partial_iterations += work.extra["partial_iterations"]
 
     def _of_blocks(self, sizes: Array) -> Array:
         """Return the largest of the sizes of components in each block."""

@@ -1,17 +1,18 @@
-"""``python -m tests.costs.record``: count what the cases cost and rewrite the record.
+"""``python -m tests.costs.record``: count what the cases cost, digest their results, rewrite both records.
 
-To be run, and its difference read, where a change is meant to alter what integrations cost.
+To be run, and its difference read, where a change is meant to alter what integrations cost or their bits.
 """
 
 import json
 
-from tests.costs.cases import CASES, RECORDED, counted
+from tests.costs import bits, cases
 
 
 def main() -> None:
-    """Rewrite the record."""
-    text = json.dumps({name: counted(name) for name in CASES}, indent=1)
-    RECORDED.write_text(text + "\n", "utf-8")
+    """Rewrite the records."""
+    costs = {name: cases.counted(name) for name in cases.CASES}
+    for path, record in ((cases.RECORDED, costs), (bits.RECORDED, bits.digested())):
+        path.write_text(json.dumps(record, indent=1) + "\n", "utf-8")
 
 
 if __name__ == "__main__":

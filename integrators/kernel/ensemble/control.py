@@ -1,9 +1,9 @@
 """The ordinary end of a step of varying length, in all lanes at once.
 
 Most steps are good enough and followed by one a little longer or shorter: these are judged, taken and
-followed here, by the rules of `integrators.kernel.step.vary` and `integrators.kernel.step.estimate`. A lane
-where anything else happens (a step that failed or was too long, a sample that is near, a coefficient that
-looks like a kink's) is left as it is, and marked for `integrators.kernel.ensemble.own` to look after.
+followed here, by the rules of `integrators.kernel.step.estimate` and `integrators.kernel.step.control`. A
+lane where anything else happens (a step that failed or was too long, a sample that is near, a coefficient
+that looks like a kink's) is left as it is, and marked for `integrators.kernel.ensemble.own` to look after.
 """
 
 from math import sqrt
@@ -41,8 +41,10 @@ MEASURED = "size", "moved", "strict", "floored"  # rooms that the iteration does
 class Control:
     """Writes the end of a step.
 
-    Judging and aiming follow `estimate`, `longer` and `accepts` there line by line, but for the last bits
-    and for lengths that are not rounded to ratios with tables, of which lanes have none.
+    Estimate, verdict and next length are the functions of `integrators.kernel.step.estimate`, `kinks` and
+    `control` that a single trajectory calls, applied to rows. What differs: coefficients are sums in another
+    order, so that they differ in the last bits; lengths are not rounded to ratios with tables, of which lanes
+    have none; and only the ordinary end of a step is written. Every other one is left to `own.settle`.
 
     Parameters
     ----------
@@ -137,11 +139,10 @@ class Control:
 
     def speed(self, d: Any) -> Value:
         """Return the velocity by momentum of row d, as `Blocks.speed`."""
+        from integrators.kernel.step.size import speed_of
+
         w = self.w
-        if not w.form.second:
-            return w.unity
-        speed = w.get(w.velocity, d).absolute()
-        return where(speed > 0.0, speed, w.unity)
+        return speed_of(w.get(w.velocity, d)) if w.form.second else w.unity
 
     def coefficients(self, d: Any) -> tuple[list[Value], Value, Value]:
         """Return what row d is judged by, and keep its polynomial for the first values of the next step.

@@ -21,6 +21,7 @@ from integrators.kernel.step.control import defect_power, error_power, is_distin
 from integrators.kernel.step.kinks import arrived, end_behind, is_near_one
 from integrators.kernel.step.loop import reset
 from integrators.kernel.step.rule import FIRST_RATE, SMALLEST
+from integrators.kernel.step.size import speed_of
 from integrators.kernel.step.vary import (
     BUSY,
     FUTILE,
@@ -69,7 +70,7 @@ def load(group, lane):
     for d in range(rows):
         ctx.factors.velocity[d] = group.all_velocity[rows * i + d]
         group.velocity[lanes * d + lane] = ctx.factors.velocity[d]
-        speed = abs(ctx.factors.velocity[d]) if ctx.second and ctx.factors.velocity[d] != 0.0 else 1.0
+        speed = speed_of(ctx.factors.velocity[d])  # 1 in first-order form
         ctx.blocks.speed[ctx.blocks.of_row[d]], ctx.blocks.mass[ctx.blocks.of_row[d]] = speed, 1.0 / speed
     for j in range(ctx.padded * ctx.lanes):
         ctx.values[j] = 0.0

@@ -26,7 +26,6 @@ from integrators.kernel.step.rule import (
     LOG_REST,
     LOG_REST_VARYING,
     MOST_IN_LANES,
-    NOTHING,
     TOLERANCE,
 )
 from problems import emit
@@ -218,20 +217,20 @@ class Steps(Writer):
 
     def drift(self, d: Index, kh: Value) -> tuple[Value, Value]:
         """Return kh (p + its error) as a sum of two doubles."""
-        from integrators.kernel.step.sums import drift  # imports numba
+        from integrators.kernel.step.sums import multiplied  # imports numba
 
         momentum = self.at(1, self.form.rows, d)
-        return drift(kh, self.get(self.state, momentum), self.get(self.error, momentum))
+        return multiplied(kh, self.get(self.state, momentum), self.get(self.error, momentum))
 
     def sizes(self) -> None:
         """Set what a change of the values is: that of the stages which follows from it, beside their block.
 
         The size of a block is the largest at the start of the step and, about, at its end.
         """
-        from integrators.kernel.step.size import inverse_sizes  # imports numba
+        from integrators.kernel.step.size import inverse_sizes, least_part  # imports numba
 
         form = self.form
-        least = NOTHING if form.varying else 0.0
+        least = least_part(form.varying)
         reach = Value(self.b, splat(self.b, self.b.load(self.word(Group.slots["reach"], DOUBLE)), form.lanes))
 
         def own(d: Index) -> Value:

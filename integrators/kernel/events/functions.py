@@ -50,12 +50,7 @@ class EventFunction:
         except InputError as refused:
             self._g, self._wanted = g, _wanted(g, refused)
             self._check(problem, refused)
-            raised.expect_callbacks()
-            kind: Any = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 4)
-            self._alive = kind(self._call)
-            address = ctypes.cast(self._alive, ctypes.c_void_p).value
-            assert address is not None
-            self.address = address
+            self._alive, self.address = _called_back(self._call)
         else:
             self.address = _compiled(traced).address
 
@@ -146,12 +141,7 @@ class Action:
                     raise
                 except Exception:
                     raise refused from None
-            raised.expect_callbacks()
-            kind: Any = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 4)
-            self._alive = kind(self._call)
-            address = ctypes.cast(self._alive, ctypes.c_void_p).value
-            assert address is not None
-            self.address = address
+            self._alive, self.address = _called_back(self._call)
         else:
             self.address = _compiled(traced).address
 
@@ -190,6 +180,15 @@ def _called(
     if dof is not None:
         offered |= {"q": y[:dof], "p": y[dof:]}
     return function(*[offered[name] for name in wanted])
+
+
+def _called_back(call: Callable[..., None]) -> tuple[Any, int]:
+    """Return what keeps a Python function alive that compiled code calls, and its address."""
+    raised.expect_callbacks()
+    alive = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 4)(call)
+    address = ctypes.cast(alive, ctypes.c_void_p).value
+    assert address is not None
+    return alive, address
 
 
 class _Raised(threading.local):

@@ -24,25 +24,26 @@ CORNER = 2.5  # times as much at twice the distance: where g is smooth it is 4, 
 
 
 @compiled
+def insert(places, directions, count, x, direction):
+    """Insert a place and its direction into ``count`` others that are in order; return how many they are."""
+    i = count
+    while i > 0 and places[i - 1] > x:
+        places[i], directions[i] = places[i - 1], directions[i - 1]
+        i -= 1
+    places[i], directions[i] = x, direction
+    return count + 1
+
+
+@compiled
 def mark(search, x, direction):
     """Note the sign of the function at a place, in order."""
-    i = search.mark_count
-    while i > 0 and search.marks[i - 1] > x:
-        search.marks[i], search.mark_signs[i] = search.marks[i - 1], search.mark_signs[i - 1]
-        i -= 1
-    search.marks[i], search.mark_signs[i] = x, direction
-    search.mark_count += 1
+    search.mark_count = insert(search.marks, search.mark_signs, search.mark_count, x, direction)
 
 
 @compiled
 def add_zero(search, x, direction):
     """Note a zero, in order."""
-    i = search.zero_count
-    while i > 0 and search.zeros[i - 1] > x:
-        search.zeros[i], search.zero_directions[i] = search.zeros[i - 1], search.zero_directions[i - 1]
-        i -= 1
-    search.zeros[i], search.zero_directions[i] = x, direction
-    search.zero_count += 1
+    search.zero_count = insert(search.zeros, search.zero_directions, search.zero_count, x, direction)
 
 
 @compiled

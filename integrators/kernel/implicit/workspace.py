@@ -347,4 +347,6 @@ def report(own: Workspace, part: Workspace) -> dict[str, Any]:
         "factorizations": own.factorizations + part.factorizations,
         "corrections": own.corrections + part.corrections,
         "rescues": own.rescues + part.rescues,
+        "partial_jacobians": part.jacobians,
+        "partial_corrections": part.corrections,
     }

@@ -11,6 +11,8 @@ class Counters(Part):
     evaluations = Integer()
     restarts = Integer()
     partial_steps = Integer()
+    partial_iterations = Integer()  # those of partial steps, which are among the iterations
+    partial_evaluations = Integer()  # the same
     implicit_steps = Integer()
     switches = Integer()
     rejections = Integer()

@@ -13,7 +13,7 @@ from integrators.kernel.simd.operations import binary_log
 from integrators.kernel.step.rule import FARTHEST
 from integrators.kernel.step.size import take_sizes
 from integrators.kernel.step.stages import offset
-from integrators.kernel.step.sums import drift, part_of_drift, time_of_step
+from integrators.kernel.step.sums import multiplied, part_of_drift, time_of_step
 from integrators.kernel.step.sweep import multiply, product, product_for_one, product_of_two, project, through
 from integrators.kernel.tables import PER_OCTAVE, THROUGH
 
@@ -77,7 +77,7 @@ def prepare(ctx):
     row_drift, row_drift_low, factor = scratch.row_drift, scratch.row_drift_low, ctx.factors.drift
     for i in range((rows + 3) // 4):
         z, e, kh = get(state, 8 * i), get(error, 8 * i), get(factor, 8 * i)
-        moved, moved_low = drift(kh, z, e)
+        moved, moved_low = multiplied(kh, z, e)
         put_upper(row_state, 4 * i, z)
         put_upper(row_error, 4 * i, e)
         put_lower(row_drift, 4 * i, moved)

@@ -12,7 +12,7 @@ from integrators.kernel.simd.memory import call_line, get, put, splat8, sums_and
 from integrators.kernel.simd.operations import fma, two_sum
 from integrators.kernel.step.projection import project_onto_energy
 from integrators.kernel.step.stages import offset
-from integrators.kernel.step.sums import drift
+from integrators.kernel.step.sums import multiplied
 
 
 @compiled
@@ -64,13 +64,6 @@ def means(ctx, d):
 
 
 @for_both_widths
-def times(factor, x, rest):
-    """Return a factor times x + rest, as a number and a rest."""
-    product = factor * x
-    return product, fma(factor, rest, fma(factor, x, -product))
-
-
-@for_both_widths
 def added(state, error, h, mean, rest):
     """Return the state after an increment of h times a mean + rest, and what it lacks.
 
@@ -79,7 +72,7 @@ def added(state, error, h, mean, rest):
     state, error : float
         A component before the step, and what it lacks.
     """
-    increment, rest = times(h, mean, rest)
+    increment, rest = multiplied(h, mean, rest)
     moved, lost = two_sum(state, increment)
     return two_sum(moved, error + (rest + lost))
 
@@ -91,8 +84,8 @@ def moved_by(state, error, moved, moved_low, h, factor, mean, rest):
     Positions are moved like that in the second-order form, with the factor h q' / p.
     """
     drifted, left = two_sum(state, moved)
-    increment, rest = times(h, mean, rest)
-    increment, rest = times(factor, increment, rest)
+    increment, rest = multiplied(h, mean, rest)
+    increment, rest = multiplied(factor, increment, rest)
     whole, lost = two_sum(drifted, increment)
     return two_sum(whole, ((moved_low + error) + left) + (rest + lost))
 
@@ -135,7 +128,7 @@ def finish_unprojected(ctx):
         factor, kick = ctx.factors.drift, ctx.factors.kick
         for i in range((rows + 3) // 4):
             z, e, kh = get(state, 8 * i), get(error, 8 * i), get(factor, 8 * i)
-            moved, moved_low = drift(kh, z, e)
+            moved, moved_low = multiplied(kh, z, e)
             force, rest = impulses(ctx, 4 * i)
             new, lost = moved_by(z, e, swap(moved), swap(moved_low), splat8(h), get(kick, 8 * i), force, rest)
             put(next_state, 8 * i, new)

@@ -148,12 +148,15 @@ def changes(ctx):
 
 @compiled
 def add_counters(ctx, partial):
-    """Count the work done in ``partial`` as that of ``ctx``."""
-    ctx.counters.iterations += partial.counters.iterations
-    ctx.counters.evaluations += partial.counters.evaluations
-    ctx.counters.restarts += partial.counters.restarts
-    partial.counters.iterations = partial.counters.evaluations = partial.counters.restarts = 0
-    ctx.counters.partial_steps += 1
+    """Count the work done in ``partial`` as that of ``ctx``, and what of it partial steps have taken."""
+    counters, of_part = ctx.counters, partial.counters
+    counters.iterations += of_part.iterations
+    counters.evaluations += of_part.evaluations
+    counters.restarts += of_part.restarts
+    counters.partial_iterations += of_part.iterations
+    counters.partial_evaluations += of_part.evaluations
+    counters.partial_steps += 1
+    of_part.iterations = of_part.evaluations = of_part.restarts = 0
 
 
 @compiled

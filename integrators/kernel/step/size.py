@@ -7,7 +7,7 @@ its group, so there are two measures, by `Blocks.weights` and by `Blocks.floored
 
 from integrators.kernel.native.jit import compiled, for_both_widths
 from integrators.kernel.simd.memory import get, larger, largest, splat8, spread
-from integrators.kernel.simd.operations import greatest, where
+from integrators.kernel.simd.operations import greatest, size, where
 from integrators.kernel.step.rule import FLOOR, LARGE, NOTHING, SMALLEST
 from integrators.kernel.step.stages import offset
 
@@ -91,12 +91,34 @@ def inverse_sizes(size, largest, least, expected, absolute):
     return inverse(own), inverse(greatest(greatest(own, FLOOR * largest), absolute))
 
 
+@for_both_widths
+def speed_of(velocity):
+    """Return the velocity by momentum of a block, by size: what its sizes are multiplied by to be compared.
+
+    Parameters
+    ----------
+    velocity : float
+        Of its rows, q' by p; 0: momenta move nothing, and sizes are compared as they are.
+    """
+    speed = size(velocity)
+    return where(speed > 0.0, speed, 1.0)
+
+
+@for_both_widths
+def least_part(varying):
+    """Return the part of the largest block in its group that a block counts as at least.
+
+    Whether steps vary is known where code for lanes is written, and is the same in all lanes.
+    """
+    return NOTHING if varying else 0.0
+
+
 @compiled
 def invert_sizes(ctx, weights, floored_weights):
     """Write the inverse sizes of all rows, by both measures; return whether all blocks have a size."""
     blocks, estimate = ctx.blocks, ctx.estimate
     known = True
-    least = NOTHING if ctx.varying else 0.0
+    least = least_part(ctx.varying)
     for d in range(ctx.rows):
         b = blocks.of_row[d]
         expected = estimate.expected[b] if estimate.rescaled else 0.0

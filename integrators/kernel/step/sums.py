@@ -20,10 +20,13 @@ def time_after(t0, time_low, h):
 
 
 @for_both_widths
-def drift(kh, p, error):
-    """Return kh (p + error), by which a position moves in a step without a force, and what it lacks."""
-    moved = kh * p
-    return moved, fma(kh, error, fma(kh, p, -moved))
+def multiplied(factor, x, rest):
+    """Return a factor times x + rest, as a number and a rest.
+
+    With the factor kh and a momentum: the drift, by which a position moves in a step without a force.
+    """
+    product = factor * x
+    return product, fma(factor, rest, fma(factor, x, -product))
 
 
 @for_both_widths

@@ -14,10 +14,11 @@ from integrators.kernel.simd.emit import ALIGNMENT, INTEGER, text_of, vector
 from integrators.kernel.simd.operations import opposite, where
 from integrators.kernel.simd.values import Value
 from integrators.kernel.step.control import as_errors_allow, as_iterations_allow, bounded, log_of_order
-from integrators.kernel.step.estimate import is_visible, local_error, size_in_step
+from integrators.kernel.step.estimate import is_gap, is_visible, judged, local_error, size_in_step
 from integrators.kernel.step.finish import added, moved_by
-from integrators.kernel.step.size import inverse_sizes
-from integrators.kernel.step.stopping import further, judge, left_over, stagnates
+from integrators.kernel.step.size import inverse_sizes, speed_of
+from integrators.kernel.step.stopping import further, judge, left_over, stagnates, untested
+from integrators.kernel.step.sums import multiplied, time_after
 
 LANES, ROWS = 8, 8
 
@@ -47,6 +48,21 @@ def control(t, y, par, out):
 def ends(t, y, par, out):
     out[0], out[1] = added(y[0], y[1], y[2], y[3], y[4])
     out[2], out[3] = moved_by(y[0], y[1], y[5], y[6], y[2], y[7], y[3], y[4])
+
+
+def coefficients(t, y, par, out):
+    low, high, slope, error, defect = judged(y[0], y[1], y[2], y[3], y[4], y[5], y[6], y[7], 0.3, 0.1)
+    out[0], out[1] = low + high, slope
+    out[2] = where(is_gap(y[0], y[1], y[2]), error, -1.0)
+    out[3] = defect
+
+
+def times(t, y, par, out):
+    later, lacks = time_after(y[0], y[1], y[2])
+    out[0] = later + multiplied(y[4], y[5], y[6])[1]
+    out[1] = lacks
+    out[2] = untested(y[3], -y[4], -50.0)
+    out[3] = speed_of(-y[7])
 
 
 def on_rows(rule):
@@ -84,7 +100,7 @@ def nothing():
     """Be compiled, for the text that takes its place."""
 
 
-@pytest.mark.parametrize("rule", [stopping, sizes, control, ends])
+@pytest.mark.parametrize("rule", [stopping, sizes, control, ends, coefficients, times])
 def test_a_rule_gives_the_same_bits_for_a_number_and_for_a_row(rule):
     random = np.random.default_rng(1)
     inputs = 10.0 ** random.uniform(-20, 2, size=(500, ROWS, LANES))
