@@ -63,11 +63,11 @@ class Gauss(MethodBase):
         With ``tol`` and nothing else but ``s``: adaptive steps that keep the long-time behaviour, because
         going back repeats them. Their density rho follows a rate w of the field,
 
-            w^4 = norm((J^2)_qq)^2 + w_0^4,    J the Jacobian of the field,
+            w^4 = norm((f_y^2)_qq)^2 + w_0^4,    f_y the Jacobian of the field f,
             log rho_{n+1/2} = log rho_{n-1/2} + 2 epsilon (w'/w)(y_n) / (rho_{n-1/2} + rho_{n+1/2}),
             h_{n+1/2} = epsilon / rho_{n+1/2},    log rho_{1/2} = log w(y_0) + (epsilon/2) (w'/w^2)(y_0),
 
-        (E. Hairer, G. Söderlind, SIAM J. Sci. Comput. 26 (2005) 1838-1851). (J^2)_qq is the derivative of the
+        (E. Hairer, G. Söderlind, SIAM J. Sci. Comput. 26 (2005) 1838-1851). (f_y^2)_qq is the derivative of the
         accelerations; w_0^2 is its median norm over the time of 256 ordinary adaptive steps, and epsilon
         the median of h w over these, at most 0.2. So ``tol`` is the local error of a typical step, and no
         step is rejected. In reversible systems the energy does not drift and the way back leads to the

@@ -98,7 +98,7 @@ class HBVM(MethodBase):
     tol : float, optional
         Local error per step, relative to the size of each block of the state (the
         momenta of one body, else each component), as estimated by
-        ``h |gamma_s|^2 / max_j |gamma_j|``. The steps then vary. 3e-16 where neither
+        ``h |gamma_s|^2 / max_{j<=3} |gamma_j|``. The steps then vary. 3e-16 where neither
         ``h`` nor ``tol`` is given: as accurate as double precision allows. In lanes
         of an ensemble, whose methods have eight or twelve nodes, 1e-14 is that.
     solver : {"auto", "fixed_point", "newton", "blended"}

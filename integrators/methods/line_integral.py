@@ -87,7 +87,7 @@ class LineIntegral(MethodBase):
     tol : float, optional
         Local error per step, relative to the size of each block of the state (the
         positions or the momenta of one body, else each component), as estimated by
-        ``h |gamma_s|^2 / max_j |gamma_j|``. The steps then vary.
+        ``h |gamma_s|^2 / max_{j<=3} |gamma_j|``. The steps then vary.
     atol : float or sequence of float, optional
         With ``tol``: local error per step that is always allowed; see `HBVM`.
     invariants : sequence of str
