@@ -1,4 +1,4 @@
-"""Hamiltonian and other systems, written down once and given to every engine alike."""
+"""Hamiltonian and other systems: every integrator receives the same vector field from one definition."""
 
 from problems.bodies import nbody
 from problems.errors import InputError, MissingLibraryError, UnknownNameError

@@ -1,4 +1,4 @@
-"""A long integration, watched: how far it is, what is kept of it in a file, and Ctrl-C."""
+"""Progress, checkpoint files and Ctrl-C of long integrations."""
 
 import hashlib
 import io
@@ -29,19 +29,19 @@ SOON = 0.1  # seconds from one look to the next, about
 
 @dataclass(frozen=True)
 class Progress:
-    """How far an integration is.
+    """Progress of an integration.
 
     Attributes
     ----------
     t : float
-        Where it is.
+        The time reached.
     fraction : float
-        Of the way, from 0 to 1.
+        Completed fraction, from 0 to 1.
     steps : int
-        Steps until now.
+        Steps so far.
     seconds, left : float
-        Since it began, or was resumed; and until its end, if it goes on as fast: infinite as long as
-        nothing is known of that.
+        Seconds since the start or the resumption, and the estimated remaining seconds; infinite as long as
+        there is no estimate.
 
     Examples
     --------

@@ -87,7 +87,7 @@ def samplings_are_as_stated(method: MethodBase, problem: Problem) -> str | None:
 
 
 def a_destination_leaves_the_samples_alone(method: MethodBase, problem: Problem) -> str | None:
-    """Check that pieces on the way to a destination have the bits of one call."""
+    """Check that pieces on the way to a destination are bitwise identical to one call."""
     if not offers(start(method, problem), Destination):
         return "it takes no destination"
     grid = irregular(problem)
@@ -192,7 +192,7 @@ def comes_back_when_it_is_stopped(method: MethodBase, problem: Problem) -> str |
 
 
 def comes_back_after_its_time(method: MethodBase, problem: Problem) -> str | None:
-    """Check that pieces made within a limit of time have the bits of one call."""
+    """Check that pieces within a time limit are bitwise identical to one call."""
     stepper: Any = start(method, problem)
     if not offers(stepper, TimeLimit):
         return "it has no limit of time"
@@ -283,7 +283,7 @@ def batches_are_single_trajectories(method: MethodBase, problem: Problem) -> str
 
 
 def prepared_batches_are_batches(method: MethodBase, problem: Problem) -> str | None:
-    """Check that a batch that was prepared has the bits of one that was not."""
+    """Check that a prepared batch is bitwise identical to one that was not prepared."""
     program: Any = method.compile(problem.system)
     if not offers(program, PreparedBatches):
         return "it prepares no batches"
@@ -292,7 +292,7 @@ def prepared_batches_are_batches(method: MethodBase, problem: Problem) -> str | 
 
 
 def threads_change_no_bits(method: MethodBase, problem: Problem) -> str | None:
-    """Check that a batch in two threads has the bits of one."""
+    """Check that a batch in two threads is bitwise identical to one in a single thread."""
     program: Any = method.compile(problem.system)
     if not (offers(program, Threads) and program.threaded):
         return "its batches take no threads"

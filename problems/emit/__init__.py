@@ -1,7 +1,7 @@
-"""One traced system to source for numpy, numba, JAX and heyoka: the same operations, in the writer's order.
+"""Source code of a traced system for NumPy, numba, JAX and heyoka.
 
-JAX is the exception: what it receives of a declared sum that stays a loop is one reduction over an array,
-whose order of additions is the library's own.
+All receive the same operations in the same order, except that JAX reorders long sums: an indexed sum that
+remains a loop becomes one reduction over an array.
 """
 
 import hashlib
@@ -52,7 +52,7 @@ class Source:
     ----------
     text : str
         One function, preceded by its index tables (``TABLE_0 = np.array(...)``)
-        where a declared sum is a loop over a list.
+        where an indexed sum is a loop over a list.
     name : str
         The function's name.
     sha256 : str
@@ -87,8 +87,8 @@ def source(system: System, quantity: Quantity, backend: str, *, limit: int | Non
         `math` as globals; works unchanged on lanes. numpy: the same signature
         on arrays. jax: ``def name(t, y, par)``. heyoka: ``def name(t, y, par, hy)``.
     limit : int or None
-        Largest number of operations of a declared sum that is written out term
-        by term; ``None``: all (always so for heyoka), 0: none.
+        Largest number of operations of an indexed sum that is unrolled; ``None``: all (always for heyoka), 0:
+        none.
 
     Raises
     ------
@@ -127,7 +127,7 @@ def _written(function: Function, name: str, backend: str, limit: int | None) -> 
 def fingerprint(system: System) -> str:
     """Return the SHA-256 of a system's field: its structure, not its parameters' values.
 
-    Of a `Foreign` system it is that of its function's code, and of what that takes from around it.
+    For a `Foreign` system it is that of its function's code and of the values that the function uses.
     """
     if system not in _fingerprints:
         if isinstance(system, Foreign):
@@ -160,7 +160,7 @@ def numpy(system: System, quantity: Quantity, *, limit: int | None = SMALL) -> C
 
 
 def numpy_of(function: Function, name: str, *, limit: int | None = SMALL) -> Callable[..., np.ndarray]:
-    """Return a function that is none of a system's own, such as one of `System.trace`, like `numpy`."""
+    """Return a further function of a system, such as one of `System.trace`, as `numpy` does."""
     return _on_arrays(_written(function, name, "numpy", limit), len(function.outputs))
 
 
