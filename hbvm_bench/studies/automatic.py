@@ -167,7 +167,7 @@ def ratios(results: Mapping[str, Sequence[Kept]]) -> Table:
         ("problem", "against", "goal", *results),
         rows,
         "The median of the ratio within each round, and whether it reaches the goal declared before; less "
-        "accurate: one of our errors is larger than the Taylor method's. " + machine.COLUMNS,
+        "accurate: an error of HBVM() is larger than that of the Taylor method. " + machine.COLUMNS,
         words=(0, 1),
     )
 
