@@ -483,7 +483,7 @@ class Solution:
         """Write the solution to a file that `load` reads: arrays and JSON in NumPy's npz format.
 
         The file contains the problem with its traced formulas, so that it can be loaded without your
-        functions; the field of a `problems.Foreign` is code and is not stored. An existing file is replaced
+        functions; the field of an `problems.Opaque` is code and is not stored. An existing file is replaced
         atomically.
 
         Raises

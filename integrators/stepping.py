@@ -458,7 +458,7 @@ class FixedStep(MethodBase):
 
         ``problems.emit.numba(system, "field")`` is the right-hand side, ``f(t, y, par, out)``; a separable
         system also has ``"force"``, p', and ``"velocity_scale"``, c with q' = c p. The field of a
-        `problems.Foreign` is Python code; the uncompiled function is then called.
+        `problems.Opaque` is Python code; the uncompiled function is then called.
 
         The function must depend only on its arguments, because samples between steps and checkpoints rely on
         that. It is stored while ``system`` exists, and is used for every ``h``.

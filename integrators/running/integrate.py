@@ -42,7 +42,7 @@ from problems import limits
 from problems.checks import File, Must, Word, checked_arguments
 from problems.errors import InputError, shown
 from problems.problem import Problem, System
-from problems.systems.untraced import Foreign
+from problems.systems.opaque import Opaque
 
 DEFAULT_SAMPLES = 1001
 SECONDS = 60.0  # from one file to the next
@@ -126,7 +126,7 @@ def integrate(
         If the method does not accept the problem, or for times, samplings, events,
         initial states and files that cannot be used.
     Exception
-        An exception raised by a `problems.Foreign` field in the first step. Later exceptions, and those of an
+        An exception raised by an `problems.Opaque` field in the first step. Later exceptions, and those of an
         event's function, end the integration with the status ``USER_ERROR``; the trajectory up to there is
         returned.
 
@@ -252,7 +252,7 @@ def integrate(
     if error is not None and stepper.t == problem.t0:  # nothing is reached that could be kept
         raise error
     stats = stepper.stats if before is None else both(before, stepper.stats)
-    if isinstance(problem.system, Foreign):
+    if isinstance(problem.system, Opaque):
         stats.extra = {**stats.extra, "field": problem.system.written}
     if watch is not None and watch.failure:
         stats.extra = {**stats.extra, "checkpoint": watch.failure}

@@ -24,6 +24,7 @@ from problems.problem import Problem
 from problems.systems.code_digest import code_digest
 
 MAGIC, VERSION = b"hbvm-bench checkpoint ", 2
+FORMER_PROBLEM = "Problem(Foreign("  # as files of versions before 0.2 name one of a `problems.Opaque`
 SOON = 0.1  # seconds from one look to the next, about
 
 
@@ -198,6 +199,8 @@ def read(path: str | os.PathLike[str], wanted: Mapping[str, str]) -> dict[str, A
             f"{where} is a checkpoint of format {version}, and this version reads "
             f"{' and '.join(map(str, READERS))}; resume it with the version that wrote it."
         )
+    if str(stored.get("problem")).startswith(FORMER_PROBLEM):
+        stored["problem"] = stored["problem"].replace(FORMER_PROBLEM, "Problem(Opaque(", 1)
     for key, value in wanted.items():
         if stored.get(key) != value:
             other = f"{stored.get('method')} on {stored.get('problem')}"

@@ -36,7 +36,7 @@ from integrators.protocol import (
 from integrators.running.integrate import integrate
 from integrators.testing.checkpoints import checkpoints_continue_bit_for_bit
 from integrators.testing.rules import finished, irregular, raises, regular, require, start
-from problems import Foreign, Problem
+from problems import Opaque, Problem
 from problems.errors import InputError
 
 BATCH_BOUND = 1e-6
@@ -112,7 +112,7 @@ def keeps_the_error_of_a_user_s_function(method: MethodBase, problem: Problem) -
             raise raised
         return [y[1], -y[0]]
 
-    swing = Problem(Foreign(field, dim=2), y0=[1.0, 0.0], t_end=6.0)
+    swing = Problem(Opaque(field, dim=2), y0=[1.0, 0.0], t_end=6.0)
     if (refusal := method.accepts(swing)) is not None:
         return refusal
     stepper = start(method, swing)

@@ -27,7 +27,7 @@ from problems.emit.plan import SMALL, make_plan
 from problems.errors import InputError, MissingLibraryError, shown, unknown
 from problems.systems.base import System
 from problems.systems.code_digest import code_digest
-from problems.systems.untraced import Foreign
+from problems.systems.opaque import Opaque
 from problems.trace.functions import FUNCTIONS, SLOW
 from problems.trace.graph import reachable
 
@@ -127,10 +127,10 @@ def _written(function: Function, name: str, backend: str, limit: int | None) -> 
 def fingerprint(system: System) -> str:
     """Return the SHA-256 of a system's field: its structure, not its parameters' values.
 
-    For a `Foreign` system it is that of its function's code and of the values that the function uses.
+    For an `Opaque` system it is that of its function's code and of the values that the function uses.
     """
     if system not in _fingerprints:
-        if isinstance(system, Foreign):
+        if isinstance(system, Opaque):
             digest = code_digest(system.f, system.dim, system.name)
         else:
             emitted = source(system, "field", "numba")
@@ -153,8 +153,8 @@ def numpy(system: System, quantity: Quantity, *, limit: int | None = SMALL) -> C
     ``y`` is (dim,) or (dim, n), the result (m,) or (m, n), of long doubles if ``y`` is of these.
     Division by zero and the like give inf and nan, in silence, as in compiled code. ``limit`` as in `source`.
     """
-    if isinstance(system, Foreign) and quantity == "field":
-        return partial(_foreign_on_arrays, system)
+    if isinstance(system, Opaque) and quantity == "field":
+        return partial(_opaque_on_arrays, system)
     function = _function(system, quantity)
     return _on_arrays(source(system, function, "numpy", limit=limit), len(function.outputs))
 
@@ -171,7 +171,7 @@ def numba_of(function: Function, name: str) -> tuple[str, Callable[..., Any]]:
     return emitted.text, _executed(emitted, namespace)
 
 
-def _foreign_on_arrays(system: Foreign, t: Any, y: Any, par: Any) -> np.ndarray:
+def _opaque_on_arrays(system: Opaque, t: Any, y: Any, par: Any) -> np.ndarray:
     states = np.asarray(y, dtype=np.float64)
     columns = np.ascontiguousarray(np.atleast_2d(states.T))
     out = np.empty_like(columns)
@@ -219,10 +219,10 @@ def numba(system: System, quantity: Quantity, *, limit: int | None = SMALL) -> A
     """Return a numba function ``f(t, y, par, out)`` on arrays, cached on disk.
 
     No fastmath: no reordering, no contraction. ``y``, ``par`` and ``out`` must not
-    overlap. ``limit`` as in `source`. The field of a `Foreign` system is a plain Python
+    overlap. ``limit`` as in `source`. The field of an `Opaque` system is a plain Python
     function.
     """
-    if isinstance(system, Foreign) and quantity == "field":
+    if isinstance(system, Opaque) and quantity == "field":
         return system.evaluate
     function = _function(system, quantity)
     cost = compilable(system, function)

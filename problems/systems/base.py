@@ -59,7 +59,7 @@ class System:
     kind : {"hamiltonian", "vector_field", "poisson"}
         What the system is.
     traced : bool
-        Whether the vector field is a graph that can be emitted; see `problems.systems.untraced`.
+        Whether the vector field is a graph that can be emitted; see `problems.systems.opaque`.
     dim : int
         Length of the state.
     dof : int or None

@@ -1,6 +1,6 @@
 """Steps in Python for a function in Python: length, solver and number of nodes are found as they go.
 
-The kernel can call such a function back (`problems.systems.untraced.Foreign`), and these steps stay apart
+The kernel can call such a function back (`problems.systems.opaque.Opaque`), and these steps stay apart
 from it because that was measured. For the same call the kernel takes 1.3 to 2.5 times as long on ten
 periods of Kepler's orbit (with the leanest callback that can be written, two thirds), 4 to 6 times on a
 short integration, since each new function makes a new program, 2 to 3 times for 1,000 components, whose
