@@ -37,7 +37,7 @@ from integrators.refusals import (
 )
 from integrators.running.checkpoints import Identity
 from integrators.running.times import plan
-from integrators.running.watchdog import Crawl
+from integrators.running.watchdog import StallDetector
 from problems.errors import unknown
 from problems.problem import System
 
@@ -104,8 +104,8 @@ class StepperBase:
     """What a function of the user raised, where the status is ``USER_ERROR``."""
     destination: float | None = None
     """Where the whole integration ends, if ``advance`` goes there in pieces."""
-    crawl: Crawl | None = None
-    """What watches the way to the destination; see `integrators.running.watchdog`."""
+    crawl: StallDetector | None = None
+    """Detects stalls on the way to the destination; see `integrators.running.watchdog`."""
 
     def __init__(self, y: Array, t: float):
         self._at_work = threading.RLock()

@@ -19,7 +19,7 @@ from problems.systems.base import System, Value
 Array = NDArray[np.float64]
 
 LONGEST = 400  # characters that ``print`` shows
-FEW = 8  # numbers of a list that it shows
+NUMBERS_SHOWN = 8  # numbers of a list that it shows
 
 
 @dataclass(frozen=True, init=False, repr=False, eq=False)
@@ -271,7 +271,7 @@ class Problem:
 def _short(numbers: re.Match[str]) -> str:
     """Return a printed list, of a long one the first three numbers and how many there are."""
     parts = numbers[0][1:-1].split(", ")
-    return numbers[0] if len(parts) <= FEW else f"[{', '.join(parts[:3])}, ... {len(parts)} in all]"
+    return numbers[0] if len(parts) <= NUMBERS_SHOWN else f"[{', '.join(parts[:3])}, ... {len(parts)} in all]"
 
 
 def _start(system: System, par: Array, t0: float, given: Mapping[str, ArrayLike | None]) -> Array:

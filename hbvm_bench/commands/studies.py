@@ -207,13 +207,13 @@ def automatic(
     Results are stored in runs/automatic; a rerun computes only what is missing.
     """
     from hbvm_bench.commands.publishing import report_on  # what draws costs seconds to import
-    from hbvm_bench.studies import automatic as duels
+    from hbvm_bench.studies import automatic
 
-    campaign = duels.campaign(problems or [], rounds)
+    campaign = automatic.campaign(problems or [], rounds)
     os.environ |= machine.restricted_to_avx2() if avx2 else {}  # of the processes that measure
     directory = Path("runs") / ("automatic" + "-avx2" * avx2)
     ensure_writable(out or directory)
     store = carry_out(campaign, directory, as_typed(context))
     run = report_on([store], out or directory / REPORT).runs[-1]
-    terminal.print_table(duels.sides(duels.duels(run)))
+    terminal.print_table(automatic.sides(automatic.head_to_heads(run)))
     terminal.console().print(machine.sentence(run.machine), highlight=False)

@@ -284,14 +284,14 @@ class HBVM(MethodBase):
 
             if self.k is not None and self.s is not None:
                 return program((self.k, self.s, None))
-            from integrators.methods.automatic import ACCURATE_IN_LANES, MANY, choose, choose_projected
+            from integrators.methods.automatic import ACCURATE_IN_LANES, WIDE, choose, choose_projected
 
             if self.projection:
                 return program(choose_projected(tol))
             alone, many = choose(system, tol), choose(system, tol, lanes=True)
             single = program(alone)
             if many != alone:
-                accurate = many[0] < MANY and tol == TOLERANCE
+                accurate = many[0] < WIDE and tol == TOLERANCE
                 single.for_many = lambda: program(many, ACCURATE_IN_LANES if accurate else tol)
             return single
         from integrators.kernel.program import HBVMProgram  # numba is for those who integrate

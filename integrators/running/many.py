@@ -47,7 +47,7 @@ from problems.problem import Problem
 from problems.systems.base import System
 
 FIRST = 64  # trajectories for each thread, of the first piece
-SHARES, MOST = 64, 4096  # pieces for an executor, and trajectories of one
+SHARES, LARGEST_PIECE = 64, 4096  # pieces for an executor, and trajectories of one
 NUMBERS = 2**22  # of the states of a piece that is reduced
 # Seconds of a piece, about, where nobody is told of it: lanes are idle at its end, and Ctrl-C loses it.
 UNWATCHED = 0.5
@@ -273,7 +273,7 @@ def _fixed_size(piece: int | None, executor: Any, reduce: Any, n: int, numbers: 
     if piece is not None:
         return piece
     if executor is not None:
-        return max(1, min(-(-n // SHARES), MOST))
+        return max(1, min(-(-n // SHARES), LARGEST_PIECE))
     return max(1, NUMBERS // numbers) if reduce else None
 
 

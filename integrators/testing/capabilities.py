@@ -51,7 +51,7 @@ ROUNDING = 1e-13
 DIFFERENCE, DIFFERENCE_BOUND = 1e-5, 1e-4
 """Relative distance of two starts, and largest error of their difference quotient as a derivative."""
 
-FEW = 64  # steps of a record
+RECORDED_STEPS = 64  # steps of a record
 ADJOINT_BOUND = 1e-9
 """Largest relative difference between a gradient by tangent vectors and by the adjoint of the same steps
 (measured: 1e-15)."""
@@ -244,9 +244,9 @@ def adjoints_are_what_tangents_say(method: MethodBase, problem: Problem) -> str 
         return str(refusal)
     tapes: list[Any] = []
     while not tapes or len(tapes[-1]):  # the last one is of the partial step that is left
-        tapes.append(stepper.recorder(FEW))
+        tapes.append(stepper.recorder(RECORDED_STEPS))
         stepper.record(tapes[-1])
-        stepper.march(end, FEW)
+        stepper.march(end, RECORDED_STEPS)
     samples = stepper.advance([end])
     plain = followed.advance([end])
     require(np.array_equal(samples.y, plain.y), "the trajectory is bitwise identical when it is recorded")

@@ -182,8 +182,8 @@ class PythonSteps:
         size, slope = norm(y / scale), norm(f / scale)
         h = min(0.01 * size / slope if min(size, slope) >= 1e-5 else 1e-6, span)
         signed = h * solver.direction
-        bend = norm((solver.fun(t + signed, y + signed * f) - f) / scale) / h
-        fastest = max(slope, bend)
+        second_derivative = norm((solver.fun(t + signed, y + signed * f) - f) / scale) / h
+        fastest = max(slope, second_derivative)
         wanted = (0.01 / fastest) ** (1.0 / (2 * self._s + 1)) if fastest > 1e-15 else max(1e-6, 1e-3 * h)
         self._length = min(100.0 * h, wanted, span, solver.max_step)
         return self._length
