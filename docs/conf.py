@@ -14,6 +14,8 @@ import problems
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE / "_ext"))
+from stored import Stored  # noqa: E402 -- beside the extensions
+
 os.environ["PYDEVD_DISABLE_FILE_VALIDATION"] = (
     "1"  # the notebooks' kernel then prints no warning about its debugger
 )
@@ -47,6 +49,7 @@ _verdicts = re.findall(r"\*\*(\d+)\*\* ([a-z ]+?)(?= ·|\n)", _paper)  # counts 
 myst_substitutions = {  # for pages that enable them
     "version": version,
     "year": time.strftime("%Y"),
+    "stored": Stored(),  # a value of a report's table
     "claims": sum(int(count) for count, _ in _verdicts),
     **{words.replace(" ", "_"): count for count, words in _verdicts},
 }

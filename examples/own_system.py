@@ -1,4 +1,4 @@
-"""A system of one's own, from its energy: a swinging Atwood machine; SciPy needs its equations by hand."""
+"""Your own system, from its energy: a swinging Atwood machine; SciPy needs its equations by hand."""
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -48,7 +48,7 @@ def compare() -> Comparison:
     def energy(y) -> float:
         return problem.errors(y)["energy"].max()
 
-    made = Comparison("A system of one's own: a swinging Atwood machine", "state at 501 times", 1e-8)
+    made = Comparison("Your own system: a swinging Atwood machine", "state at 501 times", 1e-8)
     made.add("HBVM()", lambda: run(integrators.HBVM()), lambda s: error(s.y), lambda s: energy(s.y))
     made.add("SciPy's DOP853", by_scipy, error, energy, calls=0)
     made.add("heyoka", lambda: run(integrators.Taylor()), lambda s: error(s.y), lambda s: energy(s.y))

@@ -24,7 +24,7 @@ BUSY = 0.5  # other processes that wanted a core in the last minute
 INTRODUCTION = """# Fourteen tasks, beside the library one would otherwise use
 
 Each is a short script in [examples](../examples/side_by_side.py), which the tests run. A library is accurate
-enough if its error is at most the one that is asked for; the verdict compares those alone. "First call"
+enough if its error is at most the requested one; only accurate runs are compared. "First call"
 contains compilation, unless the machine has compiled the same before; "time" is the median of further calls.
 This page is written by `make examples`.
 """

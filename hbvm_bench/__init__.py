@@ -1,1 +1,1 @@
-"""The bench: which integrator keeps what, at what cost."""
+"""The benchmark: what each integrator conserves, and at what cost."""

@@ -1,4 +1,4 @@
-"""Many trajectories of one problem, and each of them as a solution of its own."""
+"""Many trajectories of one problem, each of which is available as a solution."""
 
 import json
 from collections import Counter
@@ -36,33 +36,33 @@ FORMAT = 1  # of files
 class Solutions(Trajectories):
     """Many trajectories of a problem; see `Trajectories` for ``t``, ``y``, ``status`` and the rest.
 
-    ``solutions[i]`` is trajectory i as a `Solution`, and they can be gone through in a loop. A slice, truth
-    values or a list of numbers choose some of them: ``solutions[solutions.arrived]``.
+    ``solutions[i]`` is trajectory i as a `Solution`; iteration is supported. A slice, an array of booleans or
+    a list of indices selects some of them: ``solutions[solutions.arrived]``.
 
     Attributes
     ----------
     t : ndarray, shape (m,) or (n, m)
-        Times; each trajectory's where they differ, with NaN after the last one of a shorter row.
+        Times; one row for each trajectory if they differ, padded with NaN.
     starts : ndarray, shape (n, dim)
-        Where they start.
+        Initial states.
     par : ndarray, shape (n, n_par)
-        Their parameters, as `System.unpack` takes them.
+        Parameters, as `System.unpack` takes them.
     compile_seconds : float
         Seconds spent compiling, before the first step.
     from_cache : bool or None
         Whether the compiled code came from a cache; ``None`` where nothing is compiled.
     problem, method
-        What was integrated, and how.
+        The problem that was integrated, and the method.
     warnings : list of tuple of str
-        What to know about each trajectory although it did not fail, as `Solution.warnings`.
+        Warnings about each trajectory, as `Solution.warnings`.
     events : list of dict of str to Occurrences
-        What happened in each trajectory, by the events' names: nothing in one that Ctrl-C has left out.
-        Empty where none were looked for.
+        Occurrences of the events in each trajectory, by name; none in an interrupted one. Empty without
+        events.
     reduced : dict of str to ndarray
-        What the reductions of `integrators.reduce` amount to, by name.
+        Results of the reductions of `integrators.reduce`, by name.
     directions : tuple of ndarray, or None
-        The tangent vectors at the start of each trajectory, their parts in the state, (n, dim, k), and in the
-        parameters, (n, n_par, k), where ``variations`` were asked for.
+        Initial tangent vectors of each trajectory: components in the state, (n, dim, k), and in the
+        parameters, (n, n_par, k), if ``variations`` were requested.
 
     Examples
     --------
@@ -172,12 +172,12 @@ class Solutions(Trajectories):
 
     @property
     def arrived(self) -> Any:
-        """Which trajectories came to the last time: an array of n truth values."""
+        """Which trajectories reached the last time: a boolean array of length n."""
         return np.array([status is Status.FINISHED for status in self.status])
 
     @property
     def warnings(self) -> list[tuple[str, ...]]:
-        """Of each trajectory, the sentences that `integrators.Solution.warnings` would have."""
+        """Warnings about each trajectory, as `integrators.Solution.warnings`."""
         problem = self.problem
         caveat, conserved = self.method.caveat(problem), self.method.conserved(problem.system)
         if any(occurrences.after is not None for events in self.events for occurrences in events.values()):
@@ -202,9 +202,9 @@ class Solutions(Trajectories):
         )
 
     def errors(self) -> dict[str, Array]:
-        """Return how far each invariant is from its value at its trajectory's start, shape (n, m), by name.
+        """Return the deviation of each invariant from its initial value, shape (n, m), by name.
 
-        As `problems.Problem.errors`; NaN where a trajectory did not arrive.
+        As `problems.Problem.errors`; NaN at times that a trajectory did not reach.
         """
         return self._gathered(
             [
@@ -270,9 +270,9 @@ class Solutions(Trajectories):
         return [f"largest errors at the end{where}: {told}"] if told else []
 
     def to_pandas(self) -> Any:
-        """Return a ``pandas.DataFrame``: a row for each trajectory and time that was reached.
+        """Return a ``pandas.DataFrame`` with a row for each trajectory and time that was reached.
 
-        Its index is (trajectory, t), its columns are q0, q1 ... p0 ... (or y0 ...).
+        The index is (trajectory, t), the columns are q0, q1 ... p0 ... (or y0 ...).
 
         Raises
         ------
@@ -310,9 +310,9 @@ class Solutions(Trajectories):
 
     @checked_arguments
     def save(self, path: File) -> None:
-        """Write all to a file that `integrators.load` reads: arrays and JSON in NumPy's npz format.
+        """Write the ensemble to a file that `integrators.load` reads: arrays and JSON in NumPy's npz format.
 
-        As `Solution.save`: formulas are in it as they were traced, code is not.
+        As `Solution.save`, the file contains traced formulas and no code.
 
         Raises
         ------
@@ -355,19 +355,19 @@ _ARRAYS = ("t", "y", "starts", "par", "t_stop", "steps")
 
 @checked_arguments
 def load(path: File, problem: Problem | None = None) -> Any:
-    """Return the `Solution` or `Solutions` that ``save`` wrote to a file, bit for bit.
+    """Return the `Solution` or `Solutions` that ``save`` wrote to a file, bitwise identical.
 
     Parameters
     ----------
     path : str or path-like
         The file.
     problem : Problem, optional
-        For a field that is not traced, which no file holds: the problem that was integrated.
+        The problem that was integrated, if its field is code, which files do not contain.
 
     Raises
     ------
     problems.errors.InputError
-        For a file that is not there, is damaged, or is none of these.
+        For a file that does not exist, is damaged, or is not such a file.
 
     Examples
     --------

@@ -1,64 +1,62 @@
-"""What every integrator, ours or a peer's, satisfies.
+"""The protocol that every integrator satisfies.
 
 Guide for implementers
 ----------------------
-A **method** is a description; it holds options and nothing else.
+A **method** is a description; it holds only options.
 
-For a method with a fixed step derive from `integrators.stepping.FixedStep`, and only the
-class attributes, ``accepts`` and the function that takes the steps are left to write.
+For a method with a fixed step size derive from `integrators.stepping.FixedStep`; only the class attributes,
+``accepts`` and the function that takes the steps have to be written.
 
-1. Derive a frozen, keyword-only dataclass from `MethodBase`. Annotate each option with
-   what must hold of it (`problems.checks`, `integrators.options`): it is checked by that.
-   What depends on several options, check in ``__post_init__`` after the base's, and raise
-   `problems.errors.InputError`.
+1. Derive a frozen, keyword-only dataclass from `MethodBase`. Annotate each option with its constraint
+(`problems.checks`, `integrators.options`), which is then checked. Check conditions on several options in
+``__post_init__``, after that of the base, and raise `problems.errors.InputError`.
 2. Set the class attributes ``library`` (the package that does the work), ``citation``
    (how its authors ask to be cited) and ``order`` (``None`` where the order varies with
    the tolerance).
-3. ``accepts(problem)`` returns ``None`` or the reason why not, as a sentence. Leave it
-   out where the method takes every system.
+3. ``accepts(problem)`` returns ``None``, or a sentence on why the method cannot integrate it. Omit it if the
+method accepts every system.
 4. ``compile(system)`` does all compilation, imports the library (raising
    `problems.errors.MissingLibraryError`) and returns a `Program`, which knows
    the seconds that this took. Parameters are run-time values.
 5. ``program.start(y0, par, t0)`` returns a `Stepper` at ``t0``.
-6. A stepper's ``advance`` takes the bulk of the work in compiled code and
-   returns the samples it reached; ``step`` takes one step, for looking. The class
-   attribute ``to_end`` names the sampling by which the library itself goes to one
-   end time, where it is another than the method's best: that one is timed.
+6. A stepper's ``advance`` does most of the work in compiled code and returns the samples it reached; ``step``
+takes one step, for inspection. The class attribute ``to_end`` names the sampling with which the library
+itself integrates to an end time, if it differs from the default: that one is timed.
 7. A numerical failure is a `Status`, never an exception, never a silent NaN,
-   never an endless loop; the samples computed before it are returned.
+   and never an endless loop; the samples computed before it are returned.
 8. Register the class under the entry point group ``hbvm_bench.integrators``;
-   `integrators.testing` then checks it against these sentences.
+   `integrators.testing` then checks it against this guide.
 
-What follows is optional. Each capability is a class of this module, which the rest of the package asks for
+The following is optional. Each capability is a class of this module, which the rest of the package tests for
 by `offers`; without it the method still integrates. The conformance kit checks those that are offered.
 
-9. `Samplings`: a stepper states in ``samplings`` which ways of sampling its ``advance`` has, the default
-   first. Without it all of `SAMPLINGS` are expected.
-10. `Checkpoints`: ``checkpoint`` returns all that makes the continuation bit for bit the same, and what it
-    belongs to (`integrators.running.checkpoints.Identity`); ``restore`` takes it back, and nothing else.
-    Files of checkpoints need it (``integrate(checkpoint=...)``).
-11. `Destination`: a stepper that ends when its steps collapse is told in ``destination`` where the whole
-    integration ends, since `integrate` goes there in pieces. `integrators.running.watchdog` has the rule.
-12. `KeptError`: after ``USER_ERROR``, ``error`` is the exception that a function of the user raised.
-13. `Events`: ``with_events`` of a program starts steppers that look for events in their steps. Such an
-    `EventStepper` has the ``search``, and ``look_to``, which searches the step ahead up to the last time.
-    `Actions`: with ``acts`` these events may change the state.
-14. `Interruptible`: another thread sets ``stop`` of a stepper to call it back from ``advance``. Events of
-    many trajectories are looked for in several threads.
-15. `Batches`: ``batch`` of a program integrates many starts better than one after another, for
-    `integrate_many`. `PreparedBatches`: ``prepare_batch`` does all of it that is not integrating, so that
-    the bench can time the rest. `Threads`: with ``threaded`` it takes ``threads=``. `PieceSize`: ``piece`` is
-    the number of trajectories that it is best given first.
-16. `TimeLimit`: after ``time_limit`` seconds ``advance`` returns the samples that it has, so that `integrate`
-    can ask for all of them at once and Ctrl-C loses few.
-17. `Variations`: tangent vectors ``follow`` a stepper; ``variations`` are the vectors at the samples of the
-    last ``advance``.
-18. `Gradients`: a stepper can ``record`` its solved steps, and their ``adjoint`` follows these backwards.
-    With this and `Checkpoints`, `integrators.gradient` works.
-19. `DoubleDouble`: ``start_pairs`` of a program begins from states with twice the digits of a double; what
-    the samples of such a `LowParts` stepper leave out is its ``low``.
-20. `AsHBVM`: ``as_hbvm`` of a method returns the HBVM(k, s) that it is; `integrators.order_of` and the
-    plugins then know its coefficients.
+9. `Samplings`: the attribute ``samplings`` of a stepper lists the samplings that its ``advance`` supports,
+the default first. Without it all of `SAMPLINGS` are expected.
+10. `Checkpoints`: ``checkpoint`` returns all data that a bitwise identical continuation needs, with the
+identity of the integration (`integrators.running.checkpoints.Identity`); ``restore`` accepts only such a
+checkpoint. Checkpoint files need it (``integrate(checkpoint=...)``).
+11. `Destination`: the attribute ``destination`` of a stepper that stops when its steps collapse is the end of
+the whole integration, which `integrate` reaches in pieces. `integrators.running.watchdog` has the rule.
+12. `KeptError`: after ``USER_ERROR``, ``error`` is the exception raised by a user function.
+13. `Events`: ``with_events`` of a program starts steppers that search their steps for events. Such an
+`EventStepper` has the ``search``, and ``look_to``, which searches the next step up to the last time.
+`Actions`: with ``acts`` these events may change the state.
+14. `Interruptible`: another thread sets ``stop`` of a stepper to interrupt ``advance``. Many trajectories
+with events are integrated in several threads.
+15. `Batches`: ``batch`` of a program integrates many initial conditions faster than one after another, for
+`integrate_many`. `PreparedBatches`: ``prepare_batch`` does everything except the integration, which the
+benchmark can then time separately. `Threads`: with ``threaded`` it takes ``threads=``. `PieceSize`: ``piece``
+is the recommended number of trajectories of the first call.
+16. `TimeLimit`: after ``time_limit`` seconds ``advance`` returns the samples that it has computed, so that
+`integrate` can request all of them at once and Ctrl-C loses few.
+17. `Variations`: ``follow`` of a stepper propagates tangent vectors; ``variations`` are the vectors at the
+samples of the last ``advance``.
+18. `Gradients`: a stepper can ``record`` its steps, and ``adjoint`` integrates the adjoint equations over
+them backwards. `integrators.gradient` needs this and `Checkpoints`.
+19. `DoubleDouble`: ``start_pairs`` of a program starts from states with twice the digits of a double; ``low``
+of such a `LowParts` stepper has the low parts of the samples.
+20. `AsHBVM`: ``as_hbvm`` of a method returns the HBVM(k, s) that it is identical to; `integrators.order_of`
+and the plugins use its coefficients.
 """
 
 import inspect
@@ -115,14 +113,14 @@ _FORMER_SAMPLINGS = {"side": "partial", "land": "stop"}
 
 
 def sampling_named(sample: Any) -> Any:
-    """Return the present name of a sampling; the former ``"side"`` and ``"land"`` warn."""
+    """Return the current name of a sampling; the former ``"side"`` and ``"land"`` warn."""
     if sample is None:
         return None
     return deprecated.renamed("sampling", sample, _FORMER_SAMPLINGS, removed_in="0.2")
 
 
 class Status(StrEnum):
-    """How an integration stands, or how it ended.
+    """Status of an integration.
 
     Examples
     --------
@@ -146,17 +144,17 @@ class Status(StrEnum):
 
     @property
     def failed(self) -> bool:
-        """Whether the integration ended before its time."""
+        """Whether the integration ended before the requested time."""
         return self not in (Status.RUNNING, Status.FINISHED, Status.EVENT)
 
 
 class UserError(Exception):
-    """Carries what a function of the user raised to the code that keeps the states reached before it.
+    """Exception raised by a user function, together with the states computed before it.
 
     Attributes
     ----------
     error : Exception
-        The user's own.
+        The original exception.
     """
 
     def __init__(self, error: Exception):
@@ -167,22 +165,22 @@ class UserError(Exception):
 
 @dataclass
 class Stats:
-    """Counters of the work done; ``None`` where a library has no such counter.
+    """Statistics of an integration; ``None`` if a library does not count a quantity.
 
     Attributes
     ----------
     steps : int
         Accepted steps.
     rejections : int or None
-        Steps tried and rejected.
+        Rejected steps.
     evaluations : int or None
-        Evaluations of the vector field at one state.
+        Evaluations of the right-hand side at one state.
     iterations : int or None
         Iterations of the nonlinear solver, over all steps, partial ones included.
     solver : str or None
-        Which nonlinear solver did the work.
+        The nonlinear solver that was used.
     extra : dict
-        Anything else worth telling, by name; arrays for histories such as
+        Further information, by name; arrays for histories such as
         ``{"dt_history": (n, 2) array of t and dt}``.
 
     Examples
@@ -202,7 +200,7 @@ class Stats:
     extra: dict[str, Any] = field(default_factory=dict)
 
     def copy(self) -> "Stats":
-        """Return the counters as they are now."""
+        """Return a copy of the current counters."""
         return Stats(**vars(self))  # in a third of the time of `dataclasses.replace`
 
 
@@ -213,12 +211,11 @@ class Samples:
     Attributes
     ----------
     t : ndarray, shape (n,)
-        The times reached: a leading part of the times asked for, or the steps of the
-        method with ``sample="steps"``.
+        The times reached: the first n output times, or the ends of the steps with ``sample="steps"``.
     y : ndarray, shape (n, dim)
         The states at these times, in the problem's coordinates.
     status : Status
-        ``FINISHED`` when all times asked for were reached.
+        ``FINISHED`` if all output times were reached.
     reason : str
         One sentence on a failure; empty otherwise.
 
@@ -241,24 +238,25 @@ class Samples:
 
 @dataclass(frozen=True, eq=False)
 class Trajectories:
-    """Trajectories of one system from many starts, as ``batch`` of a program returns them.
+    """Trajectories of one system from many initial conditions, as ``batch`` of a program returns them.
 
     Attributes
     ----------
     t : ndarray, shape (m,)
         Times.
     y : ndarray, shape (n, m, dim)
-        States; NaN where a trajectory did not arrive.
+        States; NaN where a trajectory did not reach the time.
     status, reason : list, length n
-        How each trajectory ended, and one sentence where it failed.
+        Status of each trajectory, and one sentence if it failed.
     t_stop : ndarray, shape (n,)
-        The last time, or that of the last step before a failure.
+        The last time, or the time of the last step before a failure.
     steps : ndarray of int, shape (n,)
-        Steps; accepted ones where lengths vary.
+        Accepted steps.
     extra : dict of int to dict
-        By a trajectory's number, what of its `Stats.extra` warnings may follow from; see `telling`.
+        Entries of `Stats.extra` that warnings are derived from, by the index of the trajectory; see
+        `telling`.
     variations : ndarray, shape (n, m, dim, k), or None
-        Tangent vectors at the times, where they were asked for.
+        Tangent vectors at the times, if requested.
     """
 
     t: Array
@@ -272,13 +270,13 @@ class Trajectories:
 
 
 def telling(stats: Stats) -> dict[str, Any]:
-    """Return what of ``stats.extra`` warnings may follow from: kinks, and what the implicit solver did."""
+    """Return the entries of ``stats.extra`` that warnings are derived from."""
     return {name: stats.extra[name] for name in ("kinks", "implicit") if name in stats.extra}
 
 
 @runtime_checkable
 class Stepper(Protocol):
-    """A trajectory under way."""
+    """An integration in progress."""
 
     @property
     def t(self) -> float: ...
@@ -292,24 +290,24 @@ class Stepper(Protocol):
     def stats(self) -> Stats: ...
 
     def step(self) -> Status:
-        """Take one step of the method's own length."""
+        """Take one step of the method."""
         ...
 
     def advance(self, times: Array, *, sample: str | None = None) -> Samples:
         """Integrate to ``times[-1]`` and return the states at ``times``.
 
-        The stepper then stands at ``times[-1]`` or, where states between steps are
-        made beside the steps, at the last step before it.
+        The stepper is then at ``times[-1]`` or, if states between steps are computed without a change of the
+        steps, at the last step before it.
 
         Parameters
         ----------
         times : ndarray, shape (n,)
             Finite, strictly monotone in the direction of integration; the
-            first may be the present time.
+            first may be the current time.
         sample : {"partial", "steps", "stop", "dense"}, optional
-            How states between steps are made (``None``: the method's best
-            that leaves its steps unchanged, or a stop where a stop
-            costs it nothing). A method refuses what it cannot do.
+            How states between steps are computed. ``None``: the most accurate way that leaves the steps
+            unchanged, or a stop at the output times if the method does not lose efficiency by it. A method
+            refuses samplings that it does not support.
 
         Returns
         -------
@@ -318,15 +316,14 @@ class Stepper(Protocol):
         Raises
         ------
         problems.errors.InputError
-            For times that are not finite or not monotone, or a sampling the
-            method does not offer.
+            For times that are not finite or not monotone, or a sampling that the method does not support.
         """
         ...
 
 
 @runtime_checkable
 class Program(Protocol):
-    """A method compiled for one system; parameters stay run-time values."""
+    """A method compiled for one system; parameters are run-time values."""
 
     @property
     def compile_seconds(self) -> float: ...
@@ -336,19 +333,21 @@ class Program(Protocol):
         ...
 
     def start(self, y0: Array, par: Array | None = None, t0: float = 0.0) -> Stepper:
-        """Return a stepper at ``t0``; `UserError` where a function of the user raises there."""
+        """Return a stepper at ``t0``; raises `UserError` if a user function raises there."""
         ...
 
 
 class Compiled:
-    """Base of programs: pickled, one is the method and the system that it is compiled from again.
+    """Base class of programs.
+
+    A pickled program contains the method and the system, and is compiled again when it is loaded.
 
     Attributes
     ----------
     method : MethodBase
         Set by its `MethodBase.compile`.
     system : System
-        What it was compiled for.
+        The system that it was compiled for.
     """
 
     method: Any
@@ -359,106 +358,106 @@ class Compiled:
 
 
 class Samplings(Protocol):
-    """A stepper that has not all of `integrators.protocol.SAMPLINGS`, or another default.
+    """A stepper that does not support all of `integrators.protocol.SAMPLINGS`, or has another default.
 
     Attributes
     ----------
     samplings : tuple of str
-        Those that its ``advance`` takes, the default first; it refuses all others.
+        The samplings that its ``advance`` supports, the default first; it refuses all others.
     """
 
     samplings: tuple[str, ...]
 
 
 class Destination(Protocol):
-    """A stepper that is told where the whole integration ends, which ``advance`` reaches piece by piece.
+    """A stepper that knows the end of the whole integration, which ``advance`` reaches in pieces.
 
-    A stepper that notices when it no longer gets anywhere judges by this distance, not by that of a piece.
-    The samples do not depend on it.
+    A stepper that detects stalled integrations compares its progress with this distance, not with that of a
+    piece. The samples do not depend on it.
 
     Attributes
     ----------
     destination : float or None
-        That time; ``None``: each ``advance`` is an integration of its own.
+        The end time; ``None``: each ``advance`` is a separate integration.
     """
 
     destination: float | None
 
 
 class KeptError(Protocol):
-    """A stepper that keeps what a function of the user raised.
+    """A stepper that stores the exception raised by a user function.
 
     Attributes
     ----------
     error : Exception or None
-        The user's own exception, where the status is ``USER_ERROR``.
+        The original exception, if the status is ``USER_ERROR``.
     """
 
     error: Exception | None
 
 
 class Checkpoints(Protocol):
-    """A stepper that can be continued later, bit for bit: what files of checkpoints are made of."""
+    """A stepper whose integration can be continued later, bitwise identical to one without a break."""
 
     def checkpoint(self) -> Any:
-        """Return all that the continuation depends on (a value, not a view), which can be pickled."""
+        """Return all data that the continuation depends on, as a value that can be pickled (not a view)."""
         ...
 
     def restore(self, checkpoint: Any) -> None:
-        """Go back to a checkpoint of this program; the continuation is bit for bit the same.
+        """Restore a checkpoint of this program; the continuation is bitwise identical.
 
         The checkpoint may be that of another stepper of the program, or of another program of the
-        same method and system. It brings no parameters along: the stepper must have been started
-        with the same.
+        same method and system. It does not contain the parameters: the stepper must have been started with
+        the same ones.
 
         Raises
         ------
         problems.errors.InputError
-            For anything else: the checkpoint of another method, of other options, of another
-            system, of other parameters (`integrators.running.checkpoints.Identity`). The stepper
-            stays where it is.
+            For any other checkpoint: of another method, other options, another system or other parameters
+            (`integrators.running.checkpoints.Identity`). The stepper is not changed.
         """
         ...
 
 
 class Interruptible(Protocol):
-    """A stepper that another thread can call back.
+    """A stepper that another thread can interrupt.
 
     Attributes
     ----------
     stop : threading.Event or None
-        When it is set, ``advance`` ends soon by raising `KeyboardInterrupt`; what was made is not wanted.
+        If it is set, ``advance`` soon raises `KeyboardInterrupt`; its samples are discarded.
     """
 
     stop: threading.Event | None
 
 
 class TimeLimit(Protocol):
-    """A stepper whose ``advance`` comes back with a part of the samples when it has taken its time.
+    """A stepper whose ``advance`` returns with a part of the samples after a time limit.
 
     Attributes
     ----------
     time_limit : float
         Seconds after which ``advance`` returns the samples that it has, if there are any, as
-        ``FINISHED``; called with the other times it goes on as if it had not come back. Infinite at first.
+        ``FINISHED``; called with the remaining times it continues as if it had not returned. Initially
+        infinite.
     """
 
     time_limit: float
 
 
 class EventStepper(Protocol):
-    """A stepper that looks for events in its steps, as `Events.with_events` starts it.
+    """A stepper that searches its steps for events, as `Events.with_events` starts it.
 
     Attributes
     ----------
     search : integrators.events.finder.Finder
-        The search at work, and what it has found.
+        The search, with the events found so far.
     """
 
     search: Any
 
     def look_to(self, end: float) -> Status:
-        """Look for events from the last step to a time within the step ahead."""
+        """Search for events from the last step to a time within the next step."""
         ...
 
 
@@ -475,7 +474,7 @@ class Actions(Protocol):
 
 
 class Variations(Protocol):
-    """A stepper that tangent vectors can follow.
+    """A stepper that can propagate tangent vectors.
 
     Attributes
     ----------
@@ -486,16 +485,16 @@ class Variations(Protocol):
     variations: Array | None
 
     def follow(self, state: ArrayLike, parameters: ArrayLike) -> None:
-        """Let tangent vectors follow the trajectory from here on.
+        """Propagate tangent vectors along the trajectory from here on.
 
-        They are the derivatives of the steps that are taken, with the steps' lengths held fixed.
+        They are the derivatives of the steps that are taken, with fixed step sizes.
 
         Parameters
         ----------
         state : array_like, shape (dim, n)
-            Their parts in the state.
+            Their components in the state.
         parameters : array_like, shape (n_par, n)
-            Their parts in the parameters.
+            Their components in the parameters.
 
         Raises
         ------
@@ -505,25 +504,27 @@ class Variations(Protocol):
         ...
 
     def scale(self, factors: ArrayLike) -> None:
-        """Multiply the vectors by numbers, from the last own step on; powers of 2 round nothing.
+        """Multiply the vectors by numbers, from the end of the last step on.
+
+        Powers of 2 cause no rounding errors.
 
         Parameters
         ----------
         factors : array_like, shape (n,)
-            For each of the vectors, whose parts in the parameters are 0.
+            One for each vector; their components in the parameters must be 0.
         """
         ...
 
 
 class Gradients(Protocol):
-    """A stepper whose steps can be recorded, for their adjoint."""
+    """A stepper whose steps can be recorded for the adjoint equations."""
 
     def march(self, end: float, most: int) -> Samples:
-        """Take steps, ``most`` at most and none beyond the time ``end``; return them."""
+        """Take at most ``most`` steps, none beyond the time ``end``, and return their ends."""
         ...
 
     def recorder(self, capacity: int) -> Any:
-        """Return room for the records of so many steps: it has a ``len``, and a size in ``bytes``.
+        """Return memory for the records of ``capacity`` steps: it has a ``len``, and a size in ``bytes``.
 
         Raises
         ------
@@ -533,15 +534,15 @@ class Gradients(Protocol):
         ...
 
     def record(self, records: Any) -> None:
-        """Record the solved steps from here on, partial steps too."""
+        """Record the steps from here on, including partial steps."""
         ...
 
     def adjoint(self, *, parameters: bool) -> Any:
-        """Return what follows records backwards.
+        """Return an integrator of the adjoint equations over recorded steps.
 
-        ``begin(gradient)`` sets the derivatives with respect to a last state, ``follow(records)`` goes
-        back to the state before the first of some steps; ``gradient`` are the derivatives with respect to
-        that state, and with ``parameters`` those with respect to these.
+        ``begin(gradient)`` sets the derivatives with respect to the last state, ``follow(records)``
+        integrates back to the state before the first of these steps; ``gradient`` has the derivatives with
+        respect to that state and, with ``parameters``, with respect to the parameters.
         """
         ...
 
@@ -552,18 +553,18 @@ class Events(Protocol):
     def with_events(
         self, problem: Problem, events: Mapping[str, Any]
     ) -> Callable[[ArrayLike, ArrayLike | None, float, float], Any]:
-        """Compile the functions of events; return what starts a trajectory that looks for them.
+        """Compile the functions of events; return a function that starts a trajectory with a search for them.
 
-        What is returned takes the arguments of ``start``, and the time up to which is looked; it
-        returns an `EventStepper`. The events change neither steps nor samples, but a terminal one
-        ends the integration with the status ``EVENT``.
+        That function takes the arguments of ``start`` and the end time of the search; it returns an
+        `EventStepper`. The events do not affect the steps and samples; a terminal one ends the integration
+        with the status ``EVENT``.
 
         Parameters
         ----------
         problem : Problem
-            Whose variables the functions name.
+            Its variables are the arguments of the functions.
         events : mapping of str to integrators.events.Event
-            What to look for.
+            The events, by name.
 
         Raises
         ------
@@ -574,26 +575,26 @@ class Events(Protocol):
 
 
 class Batches(Protocol):
-    """A program that has a better way to integrate many starts than one after another."""
+    """A program that integrates many initial conditions faster than one after another."""
 
     def batch(
         self, Y0: ArrayLike, par: ArrayLike | None = None, *, times: ArrayLike, t0: float = 0.0
     ) -> Trajectories:
-        """Integrate starts, shape (n, dim), with parameters (n, n_par), from ``t0`` to the same times (m,).
+        """Integrate from ``Y0`` (n, dim) with parameters (n, n_par), from ``t0`` to the same times (m,).
 
-        What comes out for one does not depend on the others. One that fails has its status, reason and
-        time, and leaves the others alone.
+        Each result is independent of the others. A trajectory that fails has its status, reason and time, and
+        does not affect the others.
         """
         ...
 
 
 class PreparedBatches(Protocol):
-    """A program whose batches can be prepared, so that a clock runs for the integration alone."""
+    """A program whose batches can be prepared, so that the integration can be timed separately."""
 
     def prepare_batch(
         self, Y0: ArrayLike, par: ArrayLike | None = None, *, times: ArrayLike, t0: float = 0.0
     ) -> Callable[[], Trajectories]:
-        """Compile, check and allocate all that `Batches.batch` needs; return what then does it, once."""
+        """Compile, check and allocate for `Batches.batch`; return a function that integrates, once."""
         ...
 
 
@@ -610,7 +611,7 @@ class Threads(Protocol):
 
 
 class PieceSize(Protocol):
-    """A program whose ``batch`` is best given a certain number of trajectories first.
+    """A program whose ``batch`` has a recommended number of trajectories for its first call.
 
     Attributes
     ----------
@@ -630,7 +631,7 @@ class DoubleDouble(Protocol):
         Parameters
         ----------
         pairs : ndarray, shape (dim, 2)
-            The state: the nearest doubles, and what these leave out.
+            The state: the nearest doubles, and the low parts.
         par, t0
             As for `Program.start`.
         """
@@ -643,9 +644,9 @@ class LowParts(Protocol):
     Attributes
     ----------
     low : ndarray, shape (m, dim), or None
-        What the samples of the last ``advance`` leave out.
+        Low parts of the samples of the last ``advance``.
     pairs : ndarray, shape (dim, 2)
-        The state at exactly the present time.
+        The state at the current time.
     """
 
     low: Array | None
@@ -655,7 +656,7 @@ class LowParts(Protocol):
 
 
 class AsHBVM(Protocol):
-    """A method that is HBVM(k, s) for certain k and s, of which tableau and order are known."""
+    """A method that is identical to HBVM(k, s) for certain k and s."""
 
     def as_hbvm(self) -> "MethodBase":
         """Return it as `integrators.HBVM`.
@@ -663,7 +664,7 @@ class AsHBVM(Protocol):
         Raises
         ------
         problems.errors.InputError
-            Where options that HBVM does not have make other steps of it.
+            If options that HBVM does not have change its steps.
         """
         ...
 
@@ -694,15 +695,15 @@ def members(capability: type) -> tuple[str, ...]:
 
 @dataclass(frozen=True, kw_only=True)
 class MethodBase(CheckedOptions):
-    """Base of all methods: a frozen description that prints as the call that makes it.
+    """Base class of all methods: a frozen description that prints as the call that creates it.
 
     Attributes
     ----------
     library, citation, family : str
-        The package that does the work, how its authors ask to be cited, what kind of method it is.
+        The package that integrates, the citation that its authors ask for, and the kind of method.
     to_end : str or None
-        The sampling by which the library's own documentation goes to one end time, which is what
-        a clock runs for; ``None`` where that is the method's best, see `Stepper.advance`.
+        The sampling with which the library's documentation integrates to an end time, which is timed;
+        ``None`` if it is the default of `Stepper.advance`.
 
     Raises
     ------
@@ -728,7 +729,7 @@ class MethodBase(CheckedOptions):
     """Order of convergence, an int; ``None`` where it varies with the tolerance."""
 
     precision = cast("Any", "double")
-    """Of the numbers that it calculates with; programs of another one are `DoubleDouble`."""
+    """Precision of the arithmetic; programs with another one are `DoubleDouble`."""
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
@@ -736,18 +737,18 @@ class MethodBase(CheckedOptions):
             setattr(cls, "compile", _of_a_system(cls.compile))  # noqa: B010 -- its type stays as written
 
     def accepts(self, problem: Problem) -> str | None:
-        """Return ``None`` if the method can integrate ``problem``, else the reason; it can, by default."""
+        """Return ``None`` if the method can integrate ``problem`` (the default), else the reason."""
         return None
 
     def caveat(self, problem: Problem) -> str | None:
-        """Return why ``problem`` is outside what the method was made for although it runs, if it is."""
+        """Return why `problem` is outside the method's intended use, or `None`."""
         return None
 
     def conserved(self, system: System) -> dict[str, float]:
         """Return the invariants that the method conserves, and by how much each may change in a step.
 
-        Relative to its size; 0: by rounding only. What changes by much more has met something that no step
-        saw, and `integrators.Solution.warnings` say so.
+        Relative to its size; 0: by rounding only. A much larger change indicates a feature that all steps
+        missed, and `integrators.Solution.warnings` report it.
         """
         return {}
 

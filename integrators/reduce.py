@@ -1,7 +1,7 @@
-"""What is kept of many trajectories in place of their states, where those do not fit into memory.
+"""Reductions of many trajectories whose states do not fit into memory.
 
-A reduction goes through the states piece by piece, in the order of the trajectories. States that
-were not reached do not count.
+A reduction processes the states in pieces, in the order of the trajectories. States that were not reached are
+ignored.
 """
 
 import warnings
@@ -37,16 +37,16 @@ class Gathering(Protocol):
 
 @dataclass(frozen=True)
 class Reduction(CheckedOptions):
-    """A number of each state, and what is kept of these numbers.
+    """A reduction of a function of the state.
 
     Parameters
     ----------
     g : callable
-        A number, from the arguments that it names among ``t, q, p, y, par, m``, as a Hamiltonian is written;
-        traced.
+        A function that returns a number; its arguments are among ``t, q, p, y, par, m``, as for a
+        Hamiltonian. It is traced.
     over : {"trajectories", "times"}
-        What is gone through: all trajectories, which leaves a result for each of the m times, or all times,
-        which leaves one for each of the n trajectories.
+        The axis of the reduction: all trajectories, with one result for each of the m times, or all times,
+        with one result for each of the n trajectories.
     """
 
     _owner: ClassVar[str | None] = "a reduction"
@@ -73,7 +73,7 @@ class Reduction(CheckedOptions):
 
 @dataclass(frozen=True)
 class Mean(Reduction):
-    """The mean of g, shape (m,) or (n,); NaN where nothing arrived.
+    """The mean of g, shape (m,) or (n,); NaN if no state was reached.
 
     Examples
     --------
@@ -96,7 +96,7 @@ class Mean(Reduction):
 
 @dataclass(frozen=True)
 class Minimum(Reduction):
-    """The least g, shape (m,) or (n,); NaN where nothing arrived."""
+    """The minimum of g, shape (m,) or (n,); NaN if no state was reached."""
 
     def begin(self) -> Gathering:
         """Return what gathers the values."""
@@ -105,7 +105,7 @@ class Minimum(Reduction):
 
 @dataclass(frozen=True)
 class Maximum(Reduction):
-    """The largest g, shape (m,) or (n,); NaN where nothing arrived."""
+    """The maximum of g, shape (m,) or (n,); NaN if no state was reached."""
 
     def begin(self) -> Gathering:
         """Return what gathers the values."""
@@ -122,12 +122,12 @@ def _increases(edges: Any) -> bool:
 
 @dataclass(frozen=True)
 class Histogram(Reduction):
-    """How often g lay in each bin, as `numpy.histogram` counts: shape (m, bins) or (n, bins).
+    """The histogram of g, with the bins of `numpy.histogram`: shape (m, bins) or (n, bins).
 
     Parameters
     ----------
     edges : sequence of float
-        Of the bins, increasing. What lies outside of all is not counted.
+        Edges of the bins, increasing. Values outside are not counted.
     """
 
     edges: Annotated[Sequence[float], Must("at least two increasing numbers", _increases)] = field(
@@ -210,7 +210,7 @@ def _counted(rows: Array, edges: Array) -> Array:
 
 
 class Reducer:
-    """Reductions under way.
+    """Reductions in progress.
 
     Parameters
     ----------

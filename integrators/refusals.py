@@ -15,7 +15,7 @@ from problems.problem import System
 
 Array = NDArray[np.float64]
 
-FEW = 32  # numbers that are looked at one by one
+CHECKED_IN_PYTHON = 32  # numbers that are looked at one by one
 
 P = ParamSpec("P")
 Result = TypeVar("Result")
@@ -151,7 +151,7 @@ def check_state(y0: ArrayLike, dim: int) -> Array:
 def are_finite(y: Array) -> bool:
     """Whether all numbers of a state are finite."""
     # NumPy's functions take four times as long for four numbers
-    return all(map(math.isfinite, y.tolist())) if y.size <= FEW else bool(np.isfinite(y).all())
+    return all(map(math.isfinite, y.tolist())) if y.size <= CHECKED_IN_PYTHON else bool(np.isfinite(y).all())
 
 
 def one_thread(method: Callable[Concatenate[S, P], Result]) -> Callable[Concatenate[S, P], Result]:

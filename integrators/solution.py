@@ -1,4 +1,4 @@
-"""A trajectory, what it cost, and what to know about it."""
+"""The solution of an initial value problem: samples, statistics and warnings."""
 
 import json
 import os
@@ -40,18 +40,18 @@ FAR, MOST_AT_ONCE = 4, 1024  # intervals between samples: not gone through for n
 
 @dataclass(frozen=True, eq=False)
 class Occurrences:
-    """Where one event happened.
+    """Occurrences of one event.
 
     Attributes
     ----------
     t : ndarray, shape (n,)
         Times, in the order of integration.
     y : ndarray, shape (n, dim)
-        States there: ends of steps of solved length.
+        States at these times, each the end of a partial step.
     direction : ndarray of int, shape (n,)
-        1 where g rises, -1 where it falls, 0 where it touches zero and turns back.
+        1 where g increases, -1 where it decreases, 0 where it touches zero without a change of sign.
     after : ndarray, shape (n, dim), optional
-        What the event's action has made of the states; ``None`` for an event without one.
+        The states after the event's action; ``None`` for an event without one.
     """
 
     t: Array
@@ -66,16 +66,16 @@ class Occurrences:
 @readable
 @dataclass(frozen=True, eq=False, repr=False)
 class Solution:
-    """A trajectory and what it cost; ``print`` tells the essential.
+    """A trajectory and the work it took; ``print`` shows a summary.
 
-    Called with times, it returns the states there: `__call__`. It pickles, with any problem,
-    and `save` and `load` keep it in a file.
+    Call it with times to evaluate it there: `__call__`. It can be pickled, with any problem; `save` and
+    `load` store it in a file.
 
     Attributes
     ----------
     t : ndarray, shape (n,)
-        Times reached; all that were asked for if ``status`` is ``FINISHED``. Where a method fails on the way
-        to the first of them, the time that it came to.
+        Times reached; all output times if ``status`` is ``FINISHED``. If a method fails before the first of
+        them, the time that it reached.
     y : ndarray, shape (n, dim)
         States: q then p for Hamiltonian problems.
     status : Status
@@ -83,7 +83,7 @@ class Solution:
     reason : str
         One sentence on a failure; empty otherwise.
     t_stop : float
-        Where the method stopped: the last time asked for, or the time of the failure.
+        Time at which the integration stopped: the last output time, or the time of the failure.
     stats : Stats
         Counters of the work done.
     compile_seconds : float
@@ -91,19 +91,19 @@ class Solution:
     from_cache : bool or None
         Whether the compiled code came from a cache; ``None`` where nothing is compiled.
     problem, method
-        What was integrated, and how.
+        The problem that was integrated, and the method.
     events : dict of str to Occurrences
-        Times, states and directions of the events that were asked for, by name.
+        Times, states and directions of the requested events, by name.
     variations : ndarray, shape (n, dim, m), or None
-        Tangent vectors at these times, where they were asked for: columns in the order of what was asked.
+        Tangent vectors at these times, if requested: columns in the order of the request.
     directions : tuple of ndarray, or None
-        Their parts in the state at the start, (dim, m), and in the parameters, (n_par, m).
+        Their components in the initial state, (dim, m), and in the parameters, (n_par, m).
     low : ndarray, shape (n, dim), or None
-        What ``y`` leaves out of the states, where they have twice the digits of a double; see `pairs`.
+        Low parts of the states, if they have twice the digits of a double; see `pairs`.
     start : ndarray, shape (dim, 2), or None
-        The state that these began from, in pairs.
+        The initial state of these, in pairs.
     error : Exception or None
-        What a function of the user raised, where ``status`` is ``USER_ERROR``.
+        The exception raised by a user function, if ``status`` is ``USER_ERROR``.
 
     Examples
     --------
@@ -132,13 +132,11 @@ class Solution:
     start: Array | None = None
 
     def __call__(self, t: ArrayLike) -> Array:
-        """Return the states at any times that the trajectory covers.
+        """Return the states at arbitrary times within the computed interval.
 
-        From a sample before a time the method goes on as it began there: steps, and what
-        its `Stepper.advance` makes between them. It goes on past the next
-        samples as long as it meets them. So these states have the method's order, and
-        those of an energy-preserving method its energy, which no interpolation has; the price is
-        at most the steps from one sample to the next. At a sample's own time it is that sample.
+        The method integrates from the last sample before each time. The states therefore have the method's
+        order and conserve the energy; the cost is at most the steps between two samples. At the time of a
+        sample it returns that sample.
 
         Parameters
         ----------
@@ -152,12 +150,12 @@ class Solution:
         Raises
         ------
         problems.errors.InputError
-            For times outside, or at which the method does not arrive from the sample before.
+            For times outside the interval, or if the integration from the previous sample fails.
         """
         return self._at(t)[..., : self.problem.system.dim]
 
     def variations_at(self, t: ArrayLike) -> Array:
-        """Return the variations at any times that the trajectory covers, as a call returns the states.
+        """Return the variations at arbitrary times within the computed interval.
 
         Parameters
         ----------
@@ -187,7 +185,7 @@ class Solution:
         return rows.reshape(*rows.shape[:-1], *self.directions[0].shape)
 
     def pairs_at(self, t: ArrayLike) -> Array:
-        """Return the states at any times that the trajectory covers in pairs, as a call returns doubles.
+        """Return the states at arbitrary times within the computed interval, in pairs of doubles.
 
         Parameters
         ----------
@@ -333,7 +331,7 @@ class Solution:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Sentences on what a user should know about a solution although it did not fail."""
+        """Warnings about a solution that did not fail."""
         problem, extra = self.problem, self.stats.extra
         end = self.y[-1] if self.t.size else None
         said = warnings(problem, problem.y0, problem.par, end, self.method.caveat(problem), extra)
@@ -397,7 +395,7 @@ class Solution:
         return as_mpmath(self.pairs)
 
     def guards(self) -> dict[str, Array]:
-        """Return the quantities that a symmetry keeps at exactly zero, by name."""
+        """Return the quantities that are exactly zero by a symmetry, by name."""
         return self.problem.guards(self.y, self.t)
 
     def __repr__(self) -> str:
@@ -484,9 +482,9 @@ class Solution:
     def save(self, path: File) -> None:
         """Write the solution to a file that `load` reads: arrays and JSON in NumPy's npz format.
 
-        The problem is in it with its formulas as they were traced, so that it needs none of your
-        functions to be loaded; the field of a `problems.Foreign` is code and is not. A file of that
-        name is replaced when the new one is complete.
+        The file contains the problem with its traced formulas, so that it can be loaded without your
+        functions; the field of an `problems.Opaque` is code and is not stored. An existing file is replaced
+        atomically.
 
         Raises
         ------

@@ -1,8 +1,8 @@
-"""Bases of integrators written in Python: the book-keeping around another solver's steps.
+"""Base classes of integrators written in Python.
 
-`FixedStep` is for a method with a fixed step: it says how it takes steps, and all the rest of
-`integrators.protocol` comes with it. `ProgramBase` and `StepperBase` are for methods that choose
-their steps; `FixedStepper` also for libraries that hold the state of a fixed-step integration themselves.
+Subclasses define the step; sampling, checkpoints and failures are inherited. `FixedStep` is for methods with
+a fixed step size. `ProgramBase` and `StepperBase` are for methods with an adaptive step size; `FixedStepper`
+is also for libraries that hold the state of a fixed-step integration themselves.
 """
 
 import math
@@ -37,7 +37,7 @@ from integrators.refusals import (
 )
 from integrators.running.checkpoints import Identity
 from integrators.running.times import plan
-from integrators.running.watchdog import Crawl
+from integrators.running.watchdog import StallDetector
 from problems.errors import unknown
 from problems.problem import System
 
@@ -70,13 +70,13 @@ class ProgramBase(Compiled):
         return stepper
 
     def stepper(self, y: Array, par: Array, t: float) -> "StepperBase":
-        """Return a trajectory from a start that is checked, and its own."""
+        """Return a stepper at a checked initial state, which it may modify."""
         raise NotImplementedError
 
 
 @dataclass(frozen=True, eq=False)
 class Checkpoint:
-    """All that the continuation of a stepper depends on."""
+    """All data that the continuation of a stepper depends on."""
 
     t: float
     y: Array
@@ -89,13 +89,12 @@ class Checkpoint:
 class StepperBase:
     """A trajectory; satisfies `integrators.protocol.Stepper`.
 
-    A subclass states its ``samplings`` (the default first) and implements
-    `_serve`, `_step_states` and `_one_step`. One with checkpoints is a `RestorableStepper`.
+    A subclass sets its ``samplings`` (the default first) and implements `_serve`, `_step_states` and
+    `_one_step`. One with checkpoints is a `RestorableStepper`.
 
-    The *present* time ``t`` and state ``y`` are those last returned. The library
-    itself may be ahead of them (an adaptive method, whose steps are not
-    shortened for a sample) or behind (a fixed step, where the sample came from a partial
-    step).
+    The current time ``t`` and state ``y`` are those last returned. The library itself may be ahead of them
+    (an adaptive method, whose steps are not shortened for a sample) or behind (a fixed step size, if the
+    sample is the end of a partial step).
     """
 
     samplings: ClassVar[tuple[str, ...]] = ()
@@ -105,8 +104,8 @@ class StepperBase:
     """What a function of the user raised, where the status is ``USER_ERROR``."""
     destination: float | None = None
     """Where the whole integration ends, if ``advance`` goes there in pieces."""
-    crawl: Crawl | None = None
-    """What watches the way to the destination; see `integrators.running.watchdog`."""
+    crawl: StallDetector | None = None
+    """Detects stalls on the way to the destination; see `integrators.running.watchdog`."""
 
     def __init__(self, y: Array, t: float):
         self._at_work = threading.RLock()
@@ -116,18 +115,18 @@ class StepperBase:
 
     @property
     def t(self) -> float:
-        """The present time; after a failure, its time."""
+        """The current time; after a failure, the time of the failure."""
         return self._t
 
     @property
     @one_thread
     def y(self) -> Array:
-        """A copy of the present state."""
+        """A copy of the current state."""
         return self._y.copy()
 
     @property
     def status(self) -> Status:
-        """How the integration stands."""
+        """Status of the integration."""
         return self._status
 
     @property
@@ -137,12 +136,12 @@ class StepperBase:
 
     @property
     def stats(self) -> Stats:
-        """Counters of the work done."""
+        """Statistics."""
         return self._stats
 
     @one_thread
     def step(self) -> Status:
-        """Take one step of the method's own length; after a failure, do nothing."""
+        """Take one step of the method; after a failure, do nothing."""
         if self._status is Status.RUNNING:
             reached = self._one_step()
             if reached is not None and self._finite(*reached):
@@ -227,24 +226,24 @@ class RestorableStepper(StepperBase):
 
     @cached_property
     def identity(self) -> Identity:
-        """What its checkpoints belong to."""
+        """The identity of the integration that its checkpoints belong to."""
         program, par = self.started
         return Identity.from_system(repr(program.method), program.system, par)
 
     @one_thread
     def checkpoint(self) -> Checkpoint:
-        """Return a copy of all that the continuation depends on."""
+        """Return a copy of all data that the continuation depends on."""
         return Checkpoint(self._t, self._y.copy(), self._status, self._reason, self._save(), self.identity)
 
     @one_thread
     def restore(self, checkpoint: Checkpoint) -> None:
-        """Go back to a checkpoint of the same program; the counters keep counting.
+        """Restore a checkpoint of the same program; the statistics continue.
 
         Raises
         ------
         problems.errors.InputError
-            If the checkpoint is that of another method, of other options, another system or
-            other parameters; the stepper stays where it is.
+            If the checkpoint is that of another method, of other options, another system or other parameters;
+            the stepper is not changed.
         """
         self.identity.check(checkpoint, Checkpoint)
         self._t, self._y = checkpoint.t, checkpoint.y.copy()
@@ -261,17 +260,17 @@ class RestorableStepper(StepperBase):
 
 
 class FixedStepper(RestorableStepper):
-    """A trajectory with steps of constant length, at the times t0 + n h with an integer n.
+    """A stepper with a fixed step size, whose steps end at the times t0 + n h.
 
     ``"partial"`` (default)
-        Times that are a multiple of h are ends of steps; for others a copy takes one partial
-        step.
+        Times that are a multiple of h are ends of steps; for others one partial step is taken from a copy of
+        the state.
     ``"steps"``
         The steps up to the last time.
     ``"stop"``
-        The last step before each time is shortened onto it; steps count from there then.
+        The last step before each time is shortened to end there; the next steps start from there.
 
-    Its state is one array, which ``program.march``, a `March`, moves on. For a library that holds the
+    The state is one array, which ``program.march``, a `March`, advances. For a library that holds the
     state itself a subclass has its own `_march`, `_state`, `_aside`, `_shorten` (unless it leaves out
     ``"stop"``), `_restart`, `_save_steps` and `_load_steps`.
 
@@ -411,7 +410,7 @@ class FixedStepper(RestorableStepper):
 
 
 class March(Protocol):
-    """Takes steps ``first`` ... ``first + n - 1`` of length ``h``, of which step i begins at ``t + i h``.
+    """Function that takes steps ``first`` ... ``first + n - 1`` of size ``h``; step i begins at ``t + i h``.
 
     The state ``y``, shape (dim,), is changed in place.
     """
@@ -421,29 +420,29 @@ class March(Protocol):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class FixedStep(MethodBase):
-    """Base of an integrator with a fixed step: a subclass says how it steps, all the rest is here.
+    """Base class of an integrator with a fixed step size.
 
-    A subclass is a frozen dataclass. It states ``order``, ``library``, ``family``,
-    ``citation`` and ``evaluations`` (without annotations, which would make options of them),
-    says in `accepts` which problems it takes, if not all, and returns
-    from `march` the function that takes steps. Samples at the steps and between them,
-    checkpoints, counters, failures and integration backwards come with it;
-    `integrators.testing.check_method` checks them all.
+    Subclasses define the step; sampling, checkpoints and failures are inherited.
+
+    A subclass is a frozen dataclass. It sets ``order``, ``library``, ``family``, ``citation`` and
+    ``evaluations`` (without annotations, which would make them options), defines `accepts` if it does not
+    accept all problems, and returns from `march` the function that takes steps. Statistics and backward
+    integration are inherited too; `integrators.testing.check_method` checks the result.
 
     Parameters
     ----------
     h : float
-        Length of a step, > 0; the sign of time is that of the times asked for.
+        Step size, > 0; the output times determine the direction.
 
     Attributes
     ----------
     evaluations : int or None
-        Evaluations of the field, or of the force, in a step.
+        Evaluations of the right-hand side, or of the force, per step.
 
     Raises
     ------
     problems.errors.InputError
-        For a step that is not a finite number above 0.
+        For a step size that is not a finite number above 0.
 
     Examples
     --------
@@ -455,14 +454,14 @@ class FixedStep(MethodBase):
     evaluations: ClassVar[int | None] = None
 
     def march(self, system: System) -> March:
-        """Return the function that takes steps of ``system``, with numba if it shall be fast.
+        """Return the function that takes steps of ``system``, compiled with numba for speed.
 
-        ``problems.emit.numba(system, "field")`` is what it evaluates, ``f(t, y, par, out)``; of a separable
-        system also ``"force"``, p', and ``"velocity_scale"``, c with q' = c p. The field of a
-        `problems.Foreign` is Python: there the function runs as it was before numba compiled it.
+        ``problems.emit.numba(system, "field")`` is the right-hand side, ``f(t, y, par, out)``; a separable
+        system also has ``"force"``, p', and ``"velocity_scale"``, c with q' = c p. The field of a
+        `problems.Opaque` is Python code; the uncompiled function is then called.
 
-        It must depend on nothing but its arguments, because samples between steps and checkpoints rely
-        on that. It is kept while ``system`` lives, and serves every ``h``.
+        The function must depend only on its arguments, because samples between steps and checkpoints rely on
+        that. It is stored while ``system`` exists, and is used for every ``h``.
         """
         raise NotImplementedError
 

@@ -1,5 +1,8 @@
-"""Hamiltonian and other systems, written down once and given to every engine alike."""
+"""Hamiltonian and other systems: every integrator receives the same vector field from one definition."""
 
+from typing import Any
+
+from problems import deprecated
 from problems.bodies import nbody
 from problems.errors import InputError, MissingLibraryError, UnknownNameError
 from problems.problem import Problem
@@ -8,17 +11,17 @@ from problems.symbolic import from_sympy
 from problems.systems.base import Bodies, System
 from problems.systems.hamiltonian import Hamiltonian
 from problems.systems.lagrangian import Lagrangian
+from problems.systems.opaque import Opaque
 from problems.systems.poisson import Poisson
-from problems.systems.untraced import Foreign
 from problems.systems.vector_field import VectorField
 
 __all__ = [
     "Bodies",
-    "Foreign",
     "Hamiltonian",
     "InputError",
     "Lagrangian",
     "MissingLibraryError",
+    "Opaque",
     "Poisson",
     "Problem",
     "System",
@@ -29,3 +32,10 @@ __all__ = [
     "names",
     "nbody",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name == "Foreign":
+        deprecated.renamed("class", name, {name: "Opaque"}, removed_in="0.2")
+        return Opaque
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,4 +1,4 @@
-"""Bodies that attract each other, from their masses, positions and velocities, with further forces."""
+"""Gravitational N-body problems, with additional forces."""
 
 import inspect
 from collections.abc import Callable, Sequence
@@ -24,19 +24,19 @@ SWEEPS = 100  # of the iteration for momenta from velocities
 
 @dataclass(frozen=True)
 class J2(CheckedOptions):
-    """The flattening of a body: its potential's term with the Legendre polynomial P2.
+    """Oblateness of a body: the P2 term of its gravitational potential.
 
-    The body pulls another one, of mass m at the distance r and the height z above its equator, with the
-    potential energy ``-(G M m/r) (1 - J2 (R/r)^2 (3 (z/r)^2 - 1)/2)``; what it pulls, pulls back.
+    The potential energy with a body of mass m at the distance r and the height z above the equator is ``-(G M
+    m/r) (1 - J2 (R/r)^2 (3 (z/r)^2 - 1)/2)``; the forces on both bodies follow from it.
 
     Parameters
     ----------
     J2, R : float
         The coefficient, and the radius of the body that it belongs to.
     body : int
-        Which body is flattened.
+        Index of the oblate body.
     pole : sequence of float
-        Three numbers: the direction of its axis, of any length but 0.
+        Direction of its axis: three numbers, not all 0.
 
     Examples
     --------
@@ -85,9 +85,9 @@ class J2(CheckedOptions):
 
 @dataclass(frozen=True)
 class PostNewtonian(CheckedOptions):
-    """General relativity to the order 1/c^2, of all bodies on all (Einstein, Infeld and Hoffmann).
+    """First post-Newtonian corrections, of order 1/c^2, between all bodies (Einstein, Infeld and Hoffmann).
 
-    Its Hamiltonian, in ADM coordinates, adds the sum over a of
+    The Hamiltonian, in ADM coordinates, has the additional terms the sum over a of
     ``-p_a^4/(8 m_a^3) + G^2 m_a (sum_b m_b/r_ab)^2/2`` and over pairs a, b, both ways, of
     ``-(G m_a m_b/(4 r_ab)) (6 p_a^2/m_a^2 - (7 p_a.p_b + (n_ab.p_a)(n_ab.p_b))/(m_a m_b))``, all over c^2.
 
@@ -145,36 +145,36 @@ def nbody(
     t_end: float,
     name: str | None = None,
 ) -> Problem:
-    """Return bodies that attract each other, from their masses, positions and velocities.
+    """Return a gravitational N-body problem from masses, positions and velocities.
 
     Parameters
     ----------
     masses : array_like, shape (n,)
-        Positive, and none below 1e-10 of the largest, which is better massless. They are a
-        parameter, ``m``, as is the constant of gravitation, ``G``.
+        Positive, and none below 1e-10 of the largest (use ``massless`` for such bodies). They are the
+        parameter ``m``; the gravitational constant is the parameter ``G``.
     positions, velocities : array_like, shape (n + massless, 3)
-        Of the bodies with masses, then of those without.
+        Those of the bodies with mass, then those of the massless ones.
     massless : int
-        How many of the last bodies have no mass: they are pulled and do not pull. The pairs are then written
-        out: 5 bodies with mass and 23 without compile in 14 s.
+        Number of massless bodies (test particles), the last ones. The sums over pairs are then unrolled: 5
+        bodies with mass and 23 without compile in 14 s.
     forces : sequence
-        What acts besides Newton's attraction: `J2`, `PostNewtonian`, or a function that returns
-        accelerations, three for each body, from the arguments that it names among ``t, x, v, masses, m``,
-        with x and v as lists of three numbers for each body. It is traced, as a Hamiltonian is.
+        Additional forces: `J2`, `PostNewtonian`, or a function that returns accelerations, three for each
+        body; its arguments are among ``t, x, v, masses, m``, where x and v are lists of three numbers for
+        each body. It is traced, as a Hamiltonian is.
     G : float
-        The constant of gravitation, in the units of masses, lengths and times.
+        The gravitational constant, in the units of masses, lengths and times.
     softening : float, optional
-        A length eps: distances are sqrt(r^2 + eps^2).
+        Softening length eps: distances are sqrt(r^2 + eps^2).
     t0, t_end : float
-        The interval.
+        The integration interval.
     name : str, optional
-        What the system is called.
+        Name of the system.
 
     Returns
     -------
     Problem
         Without massless bodies and functions a `Hamiltonian`, whose state is positions and momenta, body by
-        body; then HBVM conserves the energy. Else a `VectorField`, with velocities in place of momenta.
+        body; then HBVM conserves the energy. Otherwise a `VectorField`, with velocities in place of momenta.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The errors a user can cause: one sentence that names the value and the fix."""
+"""Exceptions for errors in the input: one sentence that names the value and the fix."""
 
 import math
 import re
@@ -11,7 +11,7 @@ _COMMANDS = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u202a-\u
 
 
 class InputError(ValueError):
-    """Something the user gave cannot be used; the command line exits with code 2.
+    """Invalid input; the command line exits with code 2.
 
     Examples
     --------

@@ -27,7 +27,7 @@ LIMITS = {
 }
 """Name of each limit: its size, and what it counts."""
 
-WRITTEN_OUT = "write long sums as m.sum(lambda i: q[i]**2, range(n)), or a field as a problems.Foreign"
+WRITTEN_OUT = "write long sums as m.sum(lambda i: q[i]**2, range(n)), or a field as a problems.Opaque"
 """What to do about too many operations."""
 
 

@@ -1,4 +1,4 @@
-"""A problem: a system, a start, parameters and an integration interval."""
+"""A problem: a system, an initial state, parameters and an integration interval."""
 
 import copy
 import re
@@ -19,36 +19,36 @@ from problems.systems.base import System, Value
 Array = NDArray[np.float64]
 
 LONGEST = 400  # characters that ``print`` shows
-FEW = 8  # numbers of a list that it shows
+NUMBERS_SHOWN = 8  # numbers of a list that it shows
 
 
 @dataclass(frozen=True, init=False, repr=False, eq=False)
 class Problem:
-    """What is integrated; frozen, hashable, printed as the call that makes it.
+    """An initial value problem; immutable, hashable, printed as the call that creates it.
 
     Parameters
     ----------
     system : System
-        What moves.
+        The dynamical system.
     q0, p0, v0, y0 : array_like
-        The start: positions with momenta or (for systems with H = sum c_i p_i^2/2
-        + V) with velocities v = c p, or those of a `problems.Lagrangian`; or the whole state ``y0``.
+        The initial state: positions with momenta or (for systems with H = sum c_i p_i^2/2 + V) with
+        velocities v = c p, or those of a `problems.Lagrangian`; or the whole state ``y0``.
     parameters : mapping of str to float or sequence of float
         Values that differ from the system's defaults.
     t0, t_end : float
         Integration interval; ``t_end`` may lie before ``t0``.
     name : str, optional
-        The name under which `problems.load` knows it.
+        The name for `problems.load`.
     title : str, optional
         One line for reports.
     arguments : mapping
-        What the name is called with, for printing: ``{"e": 0.75}``.
+        Arguments of the function of that name, for printing: ``{"e": 0.75}``.
     times : array_like, optional
-        A grid on which the solution is usually looked at.
+        Default output times.
     references : sequence of str
-        Where the problem comes from.
+        Sources of the problem.
     notes : str
-        What to know about it.
+        Remarks.
 
     Raises
     ------
@@ -128,7 +128,7 @@ class Problem:
     def with_metadata(
         self, *, name: str, title: str, arguments: Mapping[str, Any], references: Sequence[str], notes: str
     ) -> Self:
-        """Return the same problem under a name: what it prints as, and what reports say of it."""
+        """Return the same problem with a name, and metadata for reports."""
         named = copy.copy(self)
         words = {
             "name": name,
@@ -150,14 +150,14 @@ class Problem:
         t0: float | None = None,
         t_end: float | None = None,
     ) -> "Problem":
-        """Return the same system from another start, with other parameters or over another interval.
+        """Return the same system with another initial state, other parameters or another interval.
 
         Parameters
         ----------
         y0 : array_like, shape (dim,), optional
-            The whole state at the start.
+            The initial state.
         parameters : mapping of str to float or sequence of float
-            Values that change; the others stay those of this problem, not the system's defaults.
+            New values; the others are those of this problem, not the system's defaults.
         t0, t_end : float, optional
             Integration interval.
 
@@ -230,7 +230,7 @@ class Problem:
         y : array_like, shape (n, dim)
             States, one per row.
         t : array_like, shape (n,), optional
-            Their times, where an invariant depends on time.
+            Times of the states, if an invariant depends on time.
 
         Returns
         -------
@@ -240,11 +240,10 @@ class Problem:
         return invariants.invariants(self.system, self.par, y, t)
 
     def errors(self, y: ArrayLike, t: ArrayLike | None = None) -> dict[str, Array]:
-        """Return how far each invariant is from its value at the start, relative to its size there.
+        """Return the deviation of each invariant from its initial value, relative to the size of that.
 
-        The difference is formed in double-double, before rounding. Vectors are
-        measured in the 2-norm. An invariant that is 0 at the start has an
-        absolute error.
+        The difference is computed in double-double, before rounding. Vectors are measured in the 2-norm. An
+        invariant that is initially 0 has an absolute error.
 
         Parameters
         ----------
@@ -258,7 +257,7 @@ class Problem:
         return invariants.errors(self.system, self.par, y, t, start=(self.t0, self.y0))
 
     def guards(self, y: ArrayLike, t: ArrayLike | None = None) -> dict[str, Array]:
-        """Return the symmetry guards, shape (n,) each; 0 where the symmetry is kept."""
+        """Return the symmetry guards, shape (n,) each; 0 as long as the symmetry is conserved."""
         return invariants.guards(self.system, self.par, y, t)
 
     def velocity(self, y: ArrayLike, t: ArrayLike | None = None) -> Array | None:
@@ -272,7 +271,7 @@ class Problem:
 def _short(numbers: re.Match[str]) -> str:
     """Return a printed list, of a long one the first three numbers and how many there are."""
     parts = numbers[0][1:-1].split(", ")
-    return numbers[0] if len(parts) <= FEW else f"[{', '.join(parts[:3])}, ... {len(parts)} in all]"
+    return numbers[0] if len(parts) <= NUMBERS_SHOWN else f"[{', '.join(parts[:3])}, ... {len(parts)} in all]"
 
 
 def _start(system: System, par: Array, t0: float, given: Mapping[str, ArrayLike | None]) -> Array:

@@ -42,7 +42,7 @@ def from_sympy(
     t : sympy.Symbol, optional
         The time; by default the symbol ``t``, as in `sympy.physics.mechanics`.
     name : str
-        What the system is called.
+        Name of the system.
 
     Returns
     -------

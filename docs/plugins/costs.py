@@ -131,7 +131,7 @@ def _scipy() -> tuple[Problem, Array, list[tuple[str, Run]]]:
     ours = {"method": HBVM, "k": 12, "s": 6, "rtol": 1e-10}
     native = integrators.HBVM(k=12, s=6, tol=1e-10)
     traced, times = field(problem), np.linspace(problem.t0, problem.t_end, 1001)
-    untraced = Problem(problems.Foreign(compiled, dim=2), y0=problem.y0, t_end=problem.t_end)
+    untraced = Problem(problems.Opaque(compiled, dim=2), y0=problem.y0, t_end=problem.t_end)
     return (
         problem,
         end,

@@ -37,10 +37,10 @@ def doctor(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="JSON output.")] = False,
 ) -> None:
-    """Say what is missing on this machine, and whether times measured here can be trusted.
+    """Check this machine: missing libraries, and whether timings are reliable.
 
-    Exit code 0 when nothing is bad, 1 when a peer is missing or times are doubtful. With --peers: 1 when
-    the bench costs a peer more than a twentieth of its time, or one did not run.
+    Exit code 0 if there is no problem, 1 if a library is missing or timings are unreliable. With --peers: 1
+    if the benchmark adds more than a twentieth to the time of a library, or one did not run.
     """
     if peers:
         _peers(context, rounds, out, as_json)
@@ -98,7 +98,7 @@ def _print(findings: dict[str, list[examining.Finding]]) -> None:
 
 
 def warm() -> None:
-    """Compile the kernel ahead, once for a machine: the first result then takes a second."""
+    """Compile the kernel in advance (once per machine)."""
     from integrators.kernel.ahead import compile_ahead
 
     for name, seconds in compile_ahead(os.cpu_count() or 1).items():

@@ -23,9 +23,9 @@ def paper(
         int | None, typer.Option(min=1, help="Number of processes; default one per core.")
     ] = None,
 ) -> None:
-    """Run the original paper's experiments again and write the report: claim, paper, here.
+    """Repeat the original paper's experiments and report each claim beside the result.
 
-    What every computation returns is kept as soon as it has ended, and a run that was interrupted goes on.
+    Results are stored as they are computed; an interrupted run resumes.
     """
     from hbvm_bench.commands.publishing import report_on  # what draws costs seconds to import
 
@@ -49,8 +49,8 @@ def chaos(
 ) -> None:
     """Compute Lyapunov exponents of known systems and maps of chaos, and write the report.
 
-    What every computation returns is kept as soon as it has ended, and a run that was interrupted goes on.
-    Times are taken one after the other, with nothing of this run beside them.
+    Results are stored as they are computed; an interrupted run resumes. Timings run one after another, while
+    nothing else of this run is running.
     """
     from hbvm_bench.commands.publishing import report_on  # what draws costs seconds to import
 

@@ -26,9 +26,9 @@ def compare(
     second: Annotated[Path, typer.Argument(help="Another run of the same campaign.")],
     as_json: Annotated[bool, typer.Option("--json", help="JSON output.")] = False,
 ) -> None:
-    """Say what changed from one run to another beyond noise.
+    """Compare two runs; report changes that exceed the noise.
 
-    Exit code 0 when nothing did, 1 when something did or a case is missing in one of them.
+    Exit code 0 if there are none, 1 if there are some or a case is missing in one of the runs.
     """
     comparison = comparing.compare(Store(first), Store(second))
     if as_json:

@@ -57,7 +57,7 @@ def race(
         bool, typer.Option("--settings", help="Print the settings that would run, and nothing else.")
     ] = False,
 ) -> None:
-    """Time our integrators against the peers, side by side, at equal energy and position error."""
+    """Time HBVM and Gauss against the other libraries at equal energy and position error."""
     from hbvm_bench.commands.publishing import report_on  # what draws costs seconds to import
     from hbvm_bench.studies.race import results, tables
 
@@ -87,7 +87,7 @@ def race(
 
 
 def race_as_data(races: "Sequence[Race]") -> dict[str, Any]:
-    """Return the results with what is read off them, as plain data for JSON."""
+    """Return the results and the quantities derived from them, as plain data for JSON."""
     from hbvm_bench.studies.race import tables
 
     levels = [(level, level * tables.POSITION_OVER_ENERGY) for level in tables.LEVELS]
@@ -113,7 +113,7 @@ def race_as_data(races: "Sequence[Race]") -> dict[str, Any]:
 
 
 def _probe(campaign: Campaign, store: Store) -> None:
-    """Measure compile times, and keep them beside those of problems that were not run this time."""
+    """Measure compile times, and add them to those of problems that were not run this time."""
     fresh: list[Probe] = []
     for entry in campaign.entries():
         cases = chosen(campaign, [name_of(entry)]).cases()
@@ -202,18 +202,18 @@ def automatic(
         ),
     ] = None,
 ) -> None:
-    """Race HBVM that chooses everything itself, HBVM(), against heyoka's Taylor(tol=1e-15).
+    """Compare `HBVM()` with default settings with heyoka's `Taylor(tol=1e-15)`.
 
-    The cases are kept in runs/automatic, and a rerun does only what is missing there.
+    Results are stored in runs/automatic; a rerun computes only what is missing.
     """
     from hbvm_bench.commands.publishing import report_on  # what draws costs seconds to import
-    from hbvm_bench.studies import automatic as duels
+    from hbvm_bench.studies import automatic
 
-    campaign = duels.campaign(problems or [], rounds)
+    campaign = automatic.campaign(problems or [], rounds)
     os.environ |= machine.restricted_to_avx2() if avx2 else {}  # of the processes that measure
     directory = Path("runs") / ("automatic" + "-avx2" * avx2)
     ensure_writable(out or directory)
     store = carry_out(campaign, directory, as_typed(context))
     run = report_on([store], out or directory / REPORT).runs[-1]
-    terminal.print_table(duels.sides(duels.duels(run)))
+    terminal.print_table(automatic.sides(automatic.head_to_heads(run)))
     terminal.console().print(machine.sentence(run.machine), highlight=False)

@@ -1,7 +1,7 @@
 """The one table of metrics: the command line, the reports and the documents read only this.
 
-A metric is a function from what was measured to a number, or to the sentence that says why there is
-none. Its docstring is what readers are told of it; a new metric is a function here.
+A metric is a function from what was measured to a number, or to a sentence on why there is none. Its
+docstring is its description in reports; a new metric is a function here.
 """
 
 from collections.abc import Callable
@@ -133,46 +133,50 @@ def invariants_max(m: Measured) -> float | str:
 
 @metric("power of t of the energy error", "slope", "", scale="linear", same_trajectory=True)
 def energy_slope(m: Measured) -> float | str:
-    """Power of t with which the energy error grows, over starts: 1/2 for a random walk."""
+    """Power of t with which the energy error grows, over initial conditions: 1/2 for a random walk."""
     return _of_law(m, "slope")
 
 
 @metric("mean energy drift", "drift", "1/time", better=None, scale="linear", same_trajectory=True)
 def energy_rate(m: Measured) -> float | str:
-    """Mean signed relative energy error per unit of time, over several starts."""
+    """Mean signed relative energy error per unit of time, over several initial conditions."""
     return _of_law(m, "rate")
 
 
-@metric("energy error at the end, over the starts", "energy, rms", "relative", same_trajectory=True)
+@metric("energy error at the end, over initial conditions", "energy, rms", "relative", same_trajectory=True)
 def energy_rms(m: Measured) -> float | str:
-    """Root mean square over several starts of the relative energy error at the end."""
+    """Root mean square over several initial conditions of the relative energy error at the end."""
     errors = m.drift.get("energy", np.empty((0, 0)))
-    return float(drift.rms(errors)[-1]) if errors.size else "no further starts were asked for"
+    return float(drift.rms(errors)[-1]) if errors.size else "no further initial conditions were requested"
 
 
 @metric("mean energy error over what is called a drift", "bias", "", scale="linear", same_trajectory=True)
 def energy_bias(m: Measured) -> float | str:
-    """Mean energy error over several starts, in units of the least that is called a drift
-    (3 of its standard errors, with few starts more): above 1 it is one.
+    """Mean energy error over several initial conditions, in units of the smallest that is called a drift (3
+    standard errors; more for few initial conditions): above 1 it is a drift.
     """
     law = m.laws.get("energy")
     if law is None or law.mean is None or not law.mean_error:
-        return "a mean needs several starts"
+        return "a mean needs several initial conditions"
     return abs(law.mean) / (drift.limit(law.starts) * law.mean_error)
 
 
 @metric("smallest energy drift within the interval", "smallest drift", "1/time", same_trajectory=True)
 def energy_rate_least(m: Measured) -> float | str:
-    """The drift nearest to 0 in the 95 % interval over several starts; 0 where that has it."""
+    """The drift nearest to 0 in the 95 % interval over several initial conditions; 0 if that
+    contains 0.
+    """
     law = m.laws.get("energy")
     if law is None or law.rate_low is None or law.rate_high is None:
-        return "an interval needs several starts"
+        return "an interval needs several initial conditions"
     return max(law.rate_low, -law.rate_high, 0.0)
 
 
-@metric("error of time reversal", "reversal", "length", same_trajectory=True)
+@metric("time-reversal error", "reversal", "length", same_trajectory=True)
 def reversal(m: Measured) -> float | str:
-    """Largest distance of a body from its start after integrating part of the span and back."""
+    """Time-reversal error: distance from the initial state after integrating forwards and back over part of
+    the interval.
+    """
     return m.reversal
 
 
@@ -210,8 +214,8 @@ def exponent_high(m: Measured) -> float | str:
 
 @metric("off-axis distance", "off axis", "length")
 def guard_max(m: Measured) -> float | str:
-    """Largest value of what the problem's symmetry keeps at exactly 0 (Sitnikov: the
-    planetoid's distance from the axis). Where it is not 0 the run follows another trajectory.
+    """Largest value of a quantity that is exactly 0 by the problem's symmetry (Sitnikov: the planetoid's
+    distance from the axis). If it is not 0, the run follows another trajectory.
     """
     return _largest_of(list(m.guards.values()), m) if m.guards else "the problem declares no symmetry guard"
 
@@ -230,8 +234,8 @@ def position_max(m: Measured) -> float | str:
 
 @metric("mean position error", "position, mean", "relative", same_trajectory=True)
 def position_mean(m: Measured) -> float | str:
-    """The geometric mean over the times of the stored reference after the start: at round-off a single
-    one is a matter of luck.
+    """Geometric mean over the times of the stored reference after the start: at round-off a single error is
+    random.
     """
     if why := _no_reference_at_end(m):
         return why
@@ -241,7 +245,7 @@ def position_mean(m: Measured) -> float | str:
 
 @metric("phase error at the end", "phase", "time", same_trajectory=True)
 def phase_end(m: Measured) -> float | str:
-    """How far in time the run is from the reference along its trajectory at the end."""
+    """Time difference to the reference along its trajectory at the end."""
     return _no_reference_at_end(m) or abs(float(m.phase[-1]))
 
 
@@ -256,7 +260,7 @@ def phase_max(m: Measured) -> float | str:
     better=None, scale="linear", same_trajectory=True, problem="sitnikov",
 )  # fmt: skip
 def z_end(m: Measured) -> float | str:
-    """Where the planetoid is on the axis at the end time."""
+    """Position of the planetoid on the axis at the end time."""
     return float(m.y[-1, PLANETOID_Z]) if m.complete else f"ended at t = {m.t_stop:.4g}"
 
 
@@ -272,7 +276,7 @@ def z_error(m: Measured) -> float | str:
 
 @metric("largest distance", "distance", "length", better=None)
 def distance_max(m: Measured) -> float | str:
-    """Largest distance of a body from the origin: shows what escaped."""
+    """Largest distance of a body from the origin; large if a body escaped."""
     return _largest(m.distance, m.t)
 
 
@@ -292,8 +296,8 @@ def evaluations(m: Measured) -> float | str:
 
 @metric("time", "time", "s", same_trajectory=True)
 def warm_seconds(m: Measured) -> float | str:
-    """Median seconds of a whole integration without output, compiled before, with no other case running;
-    of the wall or of the processor, as the campaign says.
+    """Median seconds of a whole integration without output, after compilation, with no other case running;
+    wall time or CPU time, as the campaign specifies.
     """
     if m.timing is None:
         return "not timed"
@@ -320,13 +324,13 @@ def compile_seconds(m: Measured) -> float | str:
 
 @metric("compile time, cold", "cold", "s", whole_span=False)
 def compile_cold(m: Measured) -> float | str:
-    """Seconds of compilation with nothing in a cache."""
+    """Seconds of compilation with an empty cache."""
     return _compiled(m, cached=False, otherwise="compiled code was in the cache already")
 
 
 @metric("compile time, cached", "cached", "s", whole_span=False)
 def compile_cached(m: Measured) -> float | str:
-    """Seconds until compiled code was loaded from the library's cache."""
+    """Seconds to load compiled code from the library's cache."""
     return _compiled(m, cached=True, otherwise="compiled code was not in a cache")
 
 

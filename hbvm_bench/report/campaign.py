@@ -38,7 +38,7 @@ from hbvm_bench.summaries.table import Table
 BRIEF_PROBLEMS = 3
 BRIEF_CASES = 150
 
-FEW = 3  # problems whose summaries all stand at the top
+PROBLEMS_SUMMARIZED_AT_TOP = 3  # problems whose summaries all stand at the top
 LISTED = 12  # cases without a rank that are listed at once; more are folded away
 ALL = (
     "Every case with every metric, every reason and every timing sample, as compressed JSON; "
@@ -69,7 +69,7 @@ def _parts(results: Results) -> list[ProblemPart]:
             number,
             sampled=task.sampled(tables),
             brief=brief,
-            summarized=len(tables) > FEW,
+            summarized=len(tables) > PROBLEMS_SUMMARIZED_AT_TOP,
             drawings=results.drawn(f"{PLACE}{number}"),
         )
         for number, (task, members) in enumerate(tables.items(), 1)
@@ -187,7 +187,7 @@ def what_came_out(results: Results) -> Section:
     ]
     if len(parts) == 1:
         blocks += parts[0].summary
-    elif len(parts) <= FEW:
+    elif len(parts) <= PROBLEMS_SUMMARIZED_AT_TOP:
         blocks += [
             Section(item.ranked.title, item.summary, f"summary-{i}", code=item.ranked.problem)
             for i, item in enumerate(parts, 1)

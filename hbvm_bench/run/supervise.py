@@ -63,8 +63,8 @@ class Ended:
         return f"ended by signal {known.get(-self.code, -self.code)}"
 
 
-class Fresh:
-    """A process that begins with nothing: a command, whose environment is added to this one's.
+class Subprocess:
+    """A new process that runs a command, with additions to this environment.
 
     It leads a session of its own, as a `hbvm_bench.run.warm.Fork` does, which can be watched likewise.
 
@@ -112,16 +112,16 @@ class Fresh:
         ending.kill(self.pid)
 
 
-_children: set[Fresh | Fork] = set()
+_children: set[Subprocess | Fork] = set()
 _lock = threading.Lock()
 
 
-def watch(child: Fresh | Fork, limits: Limits, compiled: Path | None = None) -> Ended:
+def watch(child: Subprocess | Fork, limits: Limits, compiled: Path | None = None) -> Ended:
     """Wait for the end of a process, or end it at its limits.
 
     Parameters
     ----------
-    child : Fresh or Fork
+    child : Subprocess or Fork
         It has just been started.
     limits : Limits
         Wall seconds and resident memory.

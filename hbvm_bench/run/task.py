@@ -178,17 +178,17 @@ def start(
     path.write_bytes(msgspec.json.encode(request))
     ended = None
     if loads is not None and warm.possible():
-        with contextlib.suppress(OSError), warm.nest(ENVIRONMENT) as nest:
-            child = nest.start(path, *loads)
+        with contextlib.suppress(OSError), warm.fork_server(ENVIRONMENT) as server:
+            child = server.start(path, *loads)
             ended = supervise.watch(child, request.limits, compiled)
             if child.lost:
                 if ended.cause == "exit":
                     ended = None
                     compiled.unlink(missing_ok=True)
-                raise ConnectionError  # the nest is of no more use
+                raise ConnectionError  # the fork server has ended
     if ended is None:
         command = [sys.executable, "-m", "hbvm_bench.run.worker", str(path), str(os.getpid())]
-        fresh = supervise.Fresh(command, {**ENVIRONMENT, **(environment or {})})
+        fresh = supervise.Subprocess(command, {**ENVIRONMENT, **(environment or {})})
         ended = supervise.watch(fresh, request.limits, compiled)
     if ended.cause == "stopped":
         raise InterruptedRunError

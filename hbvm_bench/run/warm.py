@@ -1,7 +1,7 @@
 """Warm processes: a case gets a process of its own by a fork of one that has loaded what it needs.
 
 A fresh interpreter takes half a second to import the libraries, and as long again to load compiled
-code, for a case of milliseconds. A `Nest` is a process that has imported them and, of each library,
+code, for a case of milliseconds. A `ForkServer` is a process that has imported them and, of each library,
 one that has done a case well; the next case of that library on that problem is a fork of the latter.
 Every case has a process, a memory and an end of its own, and none is done in a process that did
 another one: what it finds there was loaded, and no more.
@@ -9,8 +9,8 @@ another one: what it finds there was loaded, and no more.
 ``multiprocessing``'s fork server is not used. It forks only from a process that has imported, never from
 one that has loaded compiled code: a case of about 100 steps took 0.40 s with it, 0.07 s here and 1.36 s in a
 fresh interpreter (medians of 12 in a row, beside other work). It also cannot be replaced where it is stopped,
-and has one environment and one set of cores for all that it starts. Where a system lacks what a nest needs
-(`possible`) every case begins with nothing.
+and has one environment and one set of cores for all that it starts. Where a system lacks what a fork server
+needs (`possible`), every case runs in a new interpreter.
 
 A warm process is asked over a socket::
 
@@ -50,7 +50,7 @@ GROWTH = 2**18  # KiB that a process may have grown by and still be forked from
 
 
 @dataclass
-class Nest:
+class ForkServer:
     """A process that has imported the libraries, and those that have done a case, one of each library."""
 
     place: object  # the environment, the directory and the cores of its processes
@@ -66,7 +66,7 @@ class Nest:
         Raises
         ------
         OSError
-            If the nest is no more.
+            If the fork server has ended.
         """
         if self.done.get(library, ("",))[0] == problem:
             with contextlib.suppress(OSError):
@@ -156,7 +156,7 @@ class Fork:
 stopping = threading.Event()
 """Set while all cases are to end: no thread waits for a warm process then."""
 
-_idle: list[Nest] = []
+_idle: list[ForkServer] = []
 _lock = threading.Lock()
 
 
@@ -169,13 +169,13 @@ def _until_answered(asked: socket.socket) -> None:
 
 
 def possible() -> bool:
-    """Whether this system has what a nest needs: else every case has a process that begins with nothing."""
+    """Whether this system supports a fork server; else every case runs in a new interpreter."""
     return hasattr(os, "fork") and hasattr(os, "pidfd_open") and TASKS.is_dir()
 
 
 @contextmanager
-def nest(environment: Mapping[str, str]) -> Iterator[Nest]:
-    """Yield a nest that nobody else uses, one that is there or a new one; after an error it is ended.
+def fork_server(environment: Mapping[str, str]) -> Iterator[ForkServer]:
+    """Yield an unused fork server, an existing or a new one; after an error it is ended.
 
     ``environment`` is added to the one that it inherits.
     """
@@ -197,13 +197,13 @@ def nest(environment: Mapping[str, str]) -> Iterator[Nest]:
 
 @atexit.register
 def close() -> None:
-    """End the nests that nobody uses."""
+    """End the unused fork servers."""
     with _lock:
         while _idle:
             _idle.pop().close()
 
 
-def _new(environment: Mapping[str, str], place: object) -> Nest:
+def _new(environment: Mapping[str, str], place: object) -> ForkServer:
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     with theirs:
         process = subprocess.Popen(
@@ -215,7 +215,7 @@ def _new(environment: Mapping[str, str], place: object) -> Nest:
             pass_fds=[theirs.fileno()],
             start_new_session=True,  # a Ctrl-C at the terminal reaches the runner only
         )
-    return Nest(place, process, ours)
+    return ForkServer(place, process, ours)
 
 
 def main(asked: socket.socket) -> None:

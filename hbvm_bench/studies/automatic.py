@@ -33,8 +33,8 @@ NO_WORSE = {"energy_max": 1.0, "position_mean": 1.0}
 
 
 @dataclass(frozen=True)
-class Duel:
-    """What came out on one problem, against the goal on it, where there is one.
+class HeadToHead:
+    """The comparison of `HBVM()` with the Taylor method on one problem, with its goal, if there is one.
 
     Attributes
     ----------
@@ -89,14 +89,14 @@ def campaign(names: Sequence[str], rounds: int | None = None) -> Campaign:
     return with_rounds(chosen(load(NAME), list(names)), rounds)
 
 
-def duels(run: Kept) -> list[Duel]:
-    """Return what came out, problem by problem."""
+def head_to_heads(run: Kept) -> list[HeadToHead]:
+    """Return the comparison on each problem."""
     campaign, result = run.index.campaign, []
     judged = {verdict.entry.use: verdict for verdict in verdicts(campaign, run.records)}
     for entry, records in standings.entries(campaign, run.records):
         ours, theirs = standings.among(records, ""), standings.among(records, AGAINST)
         if ours and theirs:
-            result.append(Duel(judged.get(entry.use), ours[0], theirs[0]))
+            result.append(HeadToHead(judged.get(entry.use), ours[0], theirs[0]))
     return result
 
 
@@ -143,7 +143,7 @@ def _run(run: Kept) -> list[Block]:
             )
         ),
         *attempt(
-            ("errors and times", partial(sides, duels(run))),
+            ("errors and times", partial(sides, head_to_heads(run))),
             ("the compilations", partial(compilations.table, run.index.campaign, run.records)),
         ),
         f"Measured on {run.started[:10]} with {libraries}: `{run.command}`",
@@ -153,21 +153,22 @@ def _run(run: Kept) -> list[Block]:
 def ratios(results: Mapping[str, Sequence[Kept]]) -> Table:
     """Return how many times as long the Taylor method takes, one column for each kind of processor."""
     by_problem = {
-        kind: {duel.problem: duel for run in runs for duel in duels(run)} for kind, runs in results.items()
+        kind: {pair.problem: pair for run in runs for pair in head_to_heads(run)}
+        for kind, runs in results.items()
     }
     rows = []
-    for key in dict.fromkeys(key for duels_of in by_problem.values() for key in duels_of):
-        of_kind = [duels_of.get(key) for duels_of in by_problem.values()]
-        known = [duel for duel in of_kind if duel is not None]
-        goals = dict.fromkeys(duel.goal for duel in known)
-        settings = dict.fromkeys(duel.theirs.case.method for duel in known)
+    for key in dict.fromkeys(key for pairs_of in by_problem.values() for key in pairs_of):
+        of_kind = [pairs_of.get(key) for pairs_of in by_problem.values()]
+        known = [pair for pair in of_kind if pair is not None]
+        goals = dict.fromkeys(pair.goal for pair in known)
+        settings = dict.fromkeys(pair.theirs.case.method for pair in known)
         rows.append((key, " or ".join(settings), " or ".join(goals), *map(_cell, of_kind)))
     return Table(
         "Time of the Taylor method relative to HBVM()",
         ("problem", "against", "goal", *results),
         rows,
         "The median of the ratio within each round, and whether it reaches the goal declared before; less "
-        "accurate: one of our errors is larger than the Taylor method's. " + machine.COLUMNS,
+        "accurate: an error of HBVM() is larger than that of the Taylor method. " + machine.COLUMNS,
         words=(0, 1),
     )
 
@@ -175,28 +176,28 @@ def ratios(results: Mapping[str, Sequence[Kept]]) -> Table:
 @styled
 def ratios_drawn(results: Mapping[str, Sequence[Kept]]) -> Picture:
     """Draw the ratios, a line for each problem, with the goals."""
-    duels_of = {kind: [duel for run in runs for duel in duels(run)] for kind, runs in results.items()}
-    problems = list(dict.fromkeys(duel.problem for members in duels_of.values() for duel in members))
+    pairs_of = {kind: [pair for run in runs for pair in head_to_heads(run)] for kind, runs in results.items()}
+    problems = list(dict.fromkeys(pair.problem for members in pairs_of.values() for pair in members))
     height = {problem: len(problems) - i for i, problem in enumerate(problems)}
     figure = new(8.6, 0.9 + 0.36 * len(problems))
     axes = figure.add_axes((0.36, 0.6 / figure.get_figheight(), 0.6, 1 - 0.95 / figure.get_figheight()))
     axes.set_xscale("log")
     traces, said = [], []
-    for number, (kind, members) in enumerate(duels_of.items(), 1):
+    for number, (kind, members) in enumerate(pairs_of.items(), 1):
         shade, marker = base("HBVM")[0], "os^D"[(number - 1) % 4]
-        known = [duel for duel in members if duel.ratio is not None]
-        x = np.array([duel.ratio.median for duel in known if duel.ratio is not None])
-        y = np.array([float(height[duel.problem]) for duel in known])
-        for duel, at, up in zip(known, x, y, strict=True):
-            face = PAPER if duel.words == "less accurate" else shade
+        known = [pair for pair in members if pair.ratio is not None]
+        x = np.array([pair.ratio.median for pair in known if pair.ratio is not None])
+        y = np.array([float(height[pair.problem]) for pair in known])
+        for pair, at, up in zip(known, x, y, strict=True):
+            face = PAPER if pair.words == "less accurate" else shade
             axes.plot([at], [up], marker, color=shade, markerfacecolor=face, markersize=6)
-            said.append(f"{duel.problem}, {kind}: {at:.2f}")
+            said.append(f"{pair.problem}, {kind}: {at:.2f}")
         axes.plot([], [], marker, color=shade, label=kind, linestyle="")
         traces.append(Trace(number, kind, x, y))
-        for duel in members:
-            goal = duel.verdict.goal.ratio if duel.verdict is not None else None
+        for pair in members:
+            goal = pair.verdict.goal.ratio if pair.verdict is not None else None
             if goal is not None:
-                axes.plot([goal], [height[duel.problem]], "|", color=INK, markersize=13)
+                axes.plot([goal], [height[pair.problem]], "|", color=INK, markersize=13)
     axes.plot([], [], "|", color=INK, label="goal", linestyle="")
     axes.axvline(1.0, color=MUTED, linewidth=0.9)
     ticks = [value for value in (0.5, 1.0, 2.0, 4.0, 8.0, 16.0) if value <= 2 * axes.get_xlim()[1]]
@@ -207,7 +208,7 @@ def ratios_drawn(results: Mapping[str, Sequence[Kept]]) -> Picture:
     axes.set_ylim(0.4, len(problems) + 0.6)
     horizontal = Axis("time of the Taylor method relative to HBVM()", log=True)
     axes.set_xlabel(horizontal.label)
-    figure.legend(loc="upper right", ncols=len(duels_of) + 1, fontsize=7)
+    figure.legend(loc="upper right", ncols=len(pairs_of) + 1, fontsize=7)
     return picture(
         figure,
         "ratios",
@@ -220,23 +221,23 @@ def ratios_drawn(results: Mapping[str, Sequence[Kept]]) -> Picture:
     )
 
 
-def _cell(duel: Duel | None) -> str:
-    if duel is None:
+def _cell(pair: HeadToHead | None) -> str:
+    if pair is None:
         return "not run"
-    return duel.words if duel.ratio is None else f"{duel.ratio.median:.2f}× {duel.words}".strip()
+    return pair.words if pair.ratio is None else f"{pair.ratio.median:.2f}× {pair.words}".strip()
 
 
-def sides(duels_: Sequence[Duel]) -> Table:
+def sides(pairs_: Sequence[HeadToHead]) -> Table:
     """Return both sides' errors and times."""
     rows = []
-    for duel in duels_:
-        ratio = duel.ratio
-        for first, side in ((True, duel.ours), (False, duel.theirs)):
+    for pair in pairs_:
+        ratio = pair.ratio
+        for first, side in ((True, pair.ours), (False, pair.theirs)):
             spread = ratio is not None and ratio.low is not None and f"{ratio.low:.2f} … {ratio.high:.2f}"
             rows.append(
                 (
-                    duel.problem if first else "",
-                    duel.goal if first else duel.words,
+                    pair.problem if first else "",
+                    pair.goal if first else pair.words,
                     f"{ratio.median:.2f}" if first and ratio is not None else "",
                     spread if first and spread else "",
                     side.case.method,

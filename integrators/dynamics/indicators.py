@@ -191,8 +191,8 @@ def finite_time_exponent(
 ) -> Indicator:
     """Return the largest finite-time Lyapunov exponent: log(sigma)/t, with the norm sigma of the tangent map.
 
-    A map of it over starts shows the separatrices of a flow. Unlike the exponent, it is a function of the
-    start and of the time, and knows no average.
+    A map of it over initial conditions shows the separatrices of a flow. Unlike the exponent, it is a
+    function of the initial condition and of the time, and involves no averaging.
 
     Parameters, returns and errors are those of `sali`.
 

@@ -132,7 +132,7 @@ def lyapunov(
     t_end : float, optional
         The end; by default the problem's.
     skip : float
-        Time at the start that does not count, as that to an attractor.
+        Initial transient that is excluded.
 
     Raises
     ------

@@ -37,7 +37,7 @@ Positive = Annotated[float, Must("a number above 0", lambda x: x > 0)]
 
 @dataclass(frozen=True, eq=False)
 class PeriodicOrbit:
-    """A periodic orbit, or how near to one the search came.
+    """A periodic orbit, or the closest approximation that was found.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What a user says about an event."""
+"""The definition of an event."""
 
 import operator
 from collections.abc import Callable, Sequence
@@ -37,27 +37,26 @@ class _Direction:
 
 @dataclass(frozen=True)
 class Event(CheckedOptions):
-    """Where ``g`` vanishes along the trajectory.
+    """An event: a zero of ``g`` along the trajectory.
 
     Parameters
     ----------
     g : callable
-        A number, from the arguments that it names among ``t, q, p, y, par, m``, as a
-        Hamiltonian is written. It is traced once and then runs on whole arrays. What
-        cannot be traced (comparisons, NumPy, any other code) is called with numbers
-        instead, state by state, which is slow.
+        A function that returns a number; its arguments are among ``t, q, p, y, par, m``, as for a
+        Hamiltonian. It is traced once and then evaluated on whole arrays. A function that cannot be traced
+        (comparisons, NumPy, any other code) is called with numbers for each state, which is slow.
     direction : {0, 1, -1}
-        1: only where g rises in the order in which states are passed (also backwards in
-        time), -1: only where it falls, 0: everywhere, also where g touches zero.
+        1: only zeros at which g increases in the direction of integration (also backwards in time), -1: only
+        those at which it decreases, 0: all, also where g touches zero.
     terminal : bool or int
         True: the integration ends at the first occurrence; a number n: at the n-th.
     then : callable, optional
-        What happens to the state: a function of the same arguments, at the time of the event, that returns
-        the new state, a list of dim numbers (q then p): a bounce, a kick, a merging. It is traced once and
-        compiled, or else called with numbers, which costs some 30 µs. The integration goes on from there.
-        For the adaptive steps of `HBVM` and `Gauss`.
+        Action of the event: a function of the same arguments that returns the new state, a list of dim
+        numbers (q then p), such as a bounce, a kick or a merger. It is traced once and compiled, or else
+        called with numbers, which takes some 30 µs. The integration continues from the new state. For the
+        adaptive steps of `HBVM` and `Gauss`.
     name : str, optional
-        What it is called in the solution; the function's own name by default.
+        Name of the event in the solution; that of the function by default.
 
     Raises
     ------

@@ -16,8 +16,8 @@ from problems.problem import Problem
 Failure = tuple[Status, str, Exception | None]
 
 
-class Hits:
-    """What has happened, in the order of integration, up to the occurrence that ends it.
+class EventLog:
+    """The occurrences of events, in the order of integration, up to the one that ends it.
 
     Parameters
     ----------
@@ -104,6 +104,9 @@ class Hits:
         self.terminal, self.stop = kept["terminal"], kept["stop"]
 
 
+Hits = EventLog  # its name in the kernel
+
+
 class Finder(Protocol):
     """A search for events in the steps of one trajectory, at work.
 
@@ -116,7 +119,7 @@ class Finder(Protocol):
     trouble: Failure | None
 
     @property
-    def hits(self) -> Hits:
+    def hits(self) -> EventLog:
         """What has happened."""
         ...
 

@@ -1,13 +1,12 @@
-"""Which of HBVM and Gauss, and with which step: found by trying them on the whole trajectory.
+"""Recommended settings, with their expected errors and cost.
 
-Three settings that are accurate to rounding integrate the whole integration interval. Where they differ, no
-method in double precision knows the positions: that tells how far neighbouring trajectories
-diverge, without a model of it. Every candidate runs the span too, and its positions are
-compared with theirs, its energies with the first. Steps of fixed length are sought on a piece
-at the start, about 200 steps of `HBVM()` long, and then tried on the whole. Only where the
-span takes longer than `LOOK` seconds is an error carried on to its end: by the power of time
-by which it grew over the second half of what was looked at, at least linearly. That is how
-errors grow where motion is regular; such an accuracy does not count as reached.
+Three settings that are accurate to rounding integrate the whole interval. Their differences measure how far
+neighbouring trajectories diverge: no method in double precision determines the positions more accurately.
+Every candidate integrates the interval too, and its positions are compared with theirs, its energies with the
+initial one. Fixed step sizes are searched for on a piece at the start, about 200 steps of `HBVM()` long, and
+then tried on the whole interval. Only if the interval takes longer than `LOOK` seconds is an error
+extrapolated to its end: by the power of time with which it grew over the second half of the tested part, at
+least linearly, as errors of regular motion grow. Such an accuracy does not count as reached.
 """
 
 import math
@@ -48,7 +47,7 @@ LONGEST_S = 14  # the degree at which HBVM() works: lengths of steps are first g
 
 @dataclass(frozen=True)
 class Proposal:
-    """One setting, and what it is expected to do over the problem's whole integration interval.
+    """A setting, with its expected error and cost over the problem's whole interval.
 
     Attributes
     ----------
@@ -58,9 +57,9 @@ class Proposal:
         Expected largest error of q (of y, for systems that are not Hamiltonian), relative to the
         largest component there is, over the whole integration interval.
     energy : float or None
-        Largest relative error of the energy up to where was looked; ``None`` where there is none.
+        Largest relative error of the energy in the tested part; ``None`` for a system without energy.
     seconds : float
-        Expected time of computing, without compilation.
+        Expected run time, without compilation.
     steps : int
         Expected number of steps.
     """
@@ -74,25 +73,25 @@ class Proposal:
 
 @dataclass(frozen=True)
 class Advice:
-    """What to take, what else was tried, and why.
+    """Recommended settings, with their expected errors and cost.
 
     Attributes
     ----------
     problem : Problem
         The problem.
     accuracy : float
-        What was asked for.
+        The requested accuracy.
     proposals : tuple of Proposal
-        The settings that are expected to be as accurate as asked, the fastest first: at the end of the span,
-        or at `horizon` where no method gets further. Without one, the most accurate that was found.
+        The settings that are expected to reach the accuracy at the end of the interval, or at `horizon` if
+        that is earlier, the fastest first. If there is none, the most accurate setting that was found.
     reached : bool
-        Whether the first proposal was as accurate as asked at the problem's end. False where the end was not
-        looked at.
+        Whether the first proposal reached the accuracy at the end of the interval. False if the end was not
+        tested.
     until : float
-        The time up to which was looked: the problem's end, unless the way to there takes more than two
-        seconds or `HBVM` does not come so far.
+        Time up to which the settings were tested: the end of the interval, unless that takes more than two
+        seconds or `HBVM` fails earlier.
     horizon : float
-        The time up to which double precision can be as accurate as asked; not later than `until`.
+        Time up to which the accuracy can be reached in double precision; not later than `until`.
     why : str
         The reasons, in one to four sentences.
     """
@@ -112,7 +111,7 @@ class Advice:
 
     @property
     def method(self) -> MethodBase:
-        """The first proposal's."""
+        """The method of the first proposal."""
         return self.proposals[0].method
 
     def __str__(self) -> str:
@@ -142,14 +141,14 @@ class _Accuracy:
 
 @checked_arguments
 def advise(problem: Problem, accuracy: Annotated[float, _Accuracy()] = 1e-10) -> Advice:
-    """Say which method and step reach an accuracy at the end of a problem, and at what cost.
+    """Recommend a method and step size for a requested accuracy, with expected errors and cost.
 
     Parameters
     ----------
     problem : Problem
-        What is to be integrated, with its ``t_end``.
+        The problem, with its ``t_end``.
     accuracy : float
-        Largest error of the positions wanted at ``t_end``, relative to the largest position, in (0, 1).
+        Requested error of the positions at ``t_end``, relative to the largest position, in (0, 1).
 
     Returns
     -------
@@ -159,14 +158,14 @@ def advise(problem: Problem, accuracy: Annotated[float, _Accuracy()] = 1e-10) ->
     Raises
     ------
     problems.errors.InputError
-        For an accuracy outside (0, 1), and where `HBVM` cannot run the problem's beginning.
+        For an accuracy outside (0, 1), and if `HBVM` fails at the beginning of the problem.
 
     Notes
     -----
     `HBVM` with adaptive step size, and Gauss and HBVM with fixed ones, are tried, each on the whole
-    integration interval: some thirty trajectories. Where step lengths vary much, fixed steps are not tried.
-    The errors are differences from trajectories in double precision, and at least as large as those differ
-    among themselves.
+    integration interval: some thirty trajectories. If adaptive step sizes vary strongly, fixed ones are not
+    tried. The errors are differences from trajectories in double precision, and not smaller than the
+    differences between these.
 
     Examples
     --------

@@ -18,8 +18,8 @@ from problems.calculus.function import Function
 from problems.systems.base import System
 from problems.trace.graph import STATE, T, reachable
 
-FEW, MANY = 8, 16
-"""Stages that the field takes at a time: fewer cost as much."""
+NARROW, WIDE = 8, 16
+"""Vector widths: numbers of stages at which the field is evaluated together; fewer cost as much."""
 
 BETWEEN = 12
 """Stages in lanes where the energy is a polynomial: steps gain more from the degree than the stages cost.
@@ -29,14 +29,14 @@ oscillator at 1e-14 to 1e-6, but 1.2 of it on Kepler's and Morse's problems (Zen
 energy is as good: 7.1e-15 instead of 6.9e-15 (rms) in Henon and Heiles' problem at t = 20,000."""
 
 SPARE = 2
-"""Nodes of `MANY` that are left over for the estimates; of `FEW`, one."""
+"""Nodes of `WIDE` that are left over for the estimates; of `NARROW`, one."""
 
 DEFECT = 3e-17
 """Largest error allowed to a step's quadrature, as the last coefficient that k nodes see estimates it.
 
 The error itself is smaller than this estimate, with fewer nodes by more."""
 
-DEFECTS = {FEW: 1e-14, BETWEEN: 3e-16, MANY: DEFECT}
+DEFECTS = {NARROW: 1e-14, BETWEEN: 3e-16, WIDE: DEFECT}
 """The same for each number of nodes.
 
 The energy of the outer Solar System, of Kepler's, Henon and Heiles', Sitnikov's and twelve other problems
@@ -74,7 +74,7 @@ FUNCTION, OPAQUE = 25, 500
 # Iterations of a step: A + (B + C / s) h in the second-order form, more by a factor in the first-order form.
 A, B, C, FIRST_ORDER = 3.5, 2.8, 12.0, 2.4
 # On average, where the iteration limits the steps; these are then as long as 0.083 s.
-MOST, LENGTH_PER_DEGREE = 14.0, 0.083
+MEAN_ITERATIONS, LENGTH_PER_DEGREE = 14.0, 0.083
 # Systems of so many rows are as likely as not to have modes so fast that the iteration limits the steps.
 MANY_ROWS = 16
 
@@ -88,7 +88,7 @@ at 1e-6, 0.78 at 1e-9; that of HBVM(16, 14) 0.80 at 1e-9 and 0.85 at 1e-12. HBVM
 
 def choose_projected(tol: float) -> tuple[int, int, None]:
     """Return k and s for steps that end with a projection of the energy; see `choose`."""
-    return (FEW, FEW - 1, None) if tol >= LOOSE else (MANY, MANY - SPARE, None)
+    return (NARROW, NARROW - 1, None) if tol >= LOOSE else (WIDE, WIDE - SPARE, None)
 
 
 def exact_k(nu: int, s: int) -> int:
@@ -160,19 +160,19 @@ class Work:
             r = min(r, defect ** (1 / (2 * k - 3)))
         factor = 1.0 if self.second else FIRST_ORDER
         per_length = B + C / s
-        length = min(4 * r / (1 - r * r), (MOST / factor - A) / per_length)
+        length = min(4 * r / (1 - r * r), (MEAN_ITERATIONS / factor - A) / per_length)
         iterations = factor * (A + per_length * length)
         fast = self.rows / (self.rows + MANY_ROWS)
         by_error = self._step(k, iterations) / length
-        by_iteration = self._step(k, MOST) / (LENGTH_PER_DEGREE * s)
+        by_iteration = self._step(k, MEAN_ITERATIONS) / (LENGTH_PER_DEGREE * s)
         return (1 - fast) * by_error + fast * by_iteration
 
     def _step(self, k: int, iterations: float) -> float:
         """Return the cost of a step of so many iterations."""
         if self.lanes:
             stage = OPERATION * self.field + PRODUCT * self.rows * k
-            return k * (iterations * stage + ROW * self.rows / FEW)
-        vectors = k // FEW
+            return k * (iterations * stage + ROW * self.rows / NARROW)
+        vectors = k // NARROW
         product = PRODUCT * self.rows * k * vectors
         sweep = ITERATION + OPERATION * self.field * vectors + product
         return STEP + ROW * self.rows * vectors + iterations * sweep
@@ -213,15 +213,15 @@ def choose(system: System, tol: float, *, lanes: bool = False) -> tuple[int, int
 
     # What a field does between its nodes is not seen; only in time, or where it is code, is it likely.
     seen = system.traced and not depends_on_time(system)
-    usual = (FEW, FEW - 1) if lanes and seen else (MANY, MANY - SPARE)
-    methods = [(MANY, s) for s in range(2, MANY - SPARE + 1)]
+    usual = (NARROW, NARROW - 1) if lanes and seen else (WIDE, WIDE - SPARE)
+    methods = [(WIDE, s) for s in range(2, WIDE - SPARE + 1)]
     if seen:
-        methods += [(FEW, s) for s in range(2, FEW)]
+        methods += [(NARROW, s) for s in range(2, NARROW)]
     costs = {(k, s): work.per_time(k, s, tol, bound(k, s)) for k, s in methods}
     k, s = min(methods, key=lambda method: (costs[method], -method[1]))
     if costs[k, s] > GAIN * costs[usual]:
         k, s = usual
-    if lanes and (k, s) == (FEW, FEW - 1) and work.second and nu is not None and nu > 2:
+    if lanes and (k, s) == (NARROW, NARROW - 1) and work.second and nu is not None and nu > 2:
         return BETWEEN, BETWEEN - 1, bound(BETWEEN, BETWEEN - 1)
     # Of methods as cheap, the one of the highest order.
     k, s = max((m for m in methods if m[0] == k and costs[m] <= 1.001 * costs[k, s]), key=lambda m: m[1])

@@ -31,55 +31,53 @@ Precision = Literal["double", "double-double"]
 class Gauss(MethodBase):
     """Gauss(s): the collocation method of order 2s at the s Gauss nodes.
 
-    The very same code as ``HBVM(k=s, s=s, h)``, bit for bit: with k = s the
-    polynomial's derivative equals f at the nodes (equations: see `HBVM`). On Poisson
-    systems, for which HBVM has code of its own, the same up to rounding.
+    Bitwise identical to ``HBVM(k=s, s=s, h)``: with k = s the polynomial's derivative equals f at the nodes
+    (equations: see `HBVM`). On Poisson systems, for which HBVM has separate code, identical up to rounding.
 
     Properties, each asserted in ``tests/integrators``: order 2s (`test_order`);
-    symmetric and perfectly A-stable (`test_tableau`, `test_hbvm`); keeps every
-    quadratic invariant to round-off (`test_energy`). Symplectic, as every method
-    that keeps all quadratic invariants is.
+    symmetric and perfectly A-stable (`test_tableau`, `test_hbvm`); conserves every quadratic invariant to
+    round-off (`test_energy`). Symplectic, as is every Runge-Kutta method that conserves all quadratic
+    invariants.
 
     Limits: a Hamiltonian of degree 3 or more is conserved only up to O(h^{2s}),
-    and at large steps, or with changing steps, not at all. With a tolerance, what is
-    shorter than a step may be stepped over; see `HBVM`, whose estimate sees more, because it
-    has nodes to spare.
+    and at large steps, or with an adaptive step size, not at all. With a tolerance, a feature that is shorter
+    than a step may be missed; see `HBVM`, whose error estimate uses the additional nodes.
 
     Parameters
     ----------
     s : int
         Number of stages, s >= 1; the order is 2s. s = 1 is the implicit midpoint rule.
     h : float, optional
-        Length of a step, > 0; integration backwards takes steps of -h. With ``tol``,
-        the first step's.
+        Step size, > 0; backward integration uses -h. With ``tol``, the initial step size.
     tol : float, optional
-        Local error per step, as for `HBVM`; s > 1. With the steps that then vary, Gauss
-        keeps no energy over long times (`test_adaptive`), unless they are reversible.
+        Local error per step, as for `HBVM`; s > 1. With the adaptive steps that follow, Gauss does not
+        conserve the energy over long times (`test_adaptive`), unless the steps are reversible.
     solver : {"auto", "fixed_point", "newton", "blended"}
         How the stage equations are solved; see `HBVM`.
     max_step, breakpoints, max_steps, atol
         With ``tol``; see `HBVM`.
     steps : {"reversible"}, optional
-        With ``tol`` and nothing else but ``s``: adaptive steps that keep the long-time behaviour, because
-        going back repeats them. Their density rho follows a rate w of the field,
+        With ``tol`` and ``s`` only: adaptive steps that preserve the long-time behaviour, because the
+        reversed integration takes the same steps. Their density rho follows a rate w of the field,
 
-            w^4 = norm((J^2)_qq)^2 + w_0^4,    J the Jacobian of the field,
+            w^4 = norm((f_y^2)_qq)^2 + w_0^4,    f_y the Jacobian of the field f,
             log rho_{n+1/2} = log rho_{n-1/2} + 2 epsilon (w'/w)(y_n) / (rho_{n-1/2} + rho_{n+1/2}),
             h_{n+1/2} = epsilon / rho_{n+1/2},    log rho_{1/2} = log w(y_0) + (epsilon/2) (w'/w^2)(y_0),
 
-        (E. Hairer, G. Söderlind, SIAM J. Sci. Comput. 26 (2005) 1838-1851). (J^2)_qq is the derivative of the
-        accelerations; w_0^2 is its median norm over the time of 256 ordinary adaptive steps, and epsilon
+        (E. Hairer, G. Söderlind, SIAM J. Sci. Comput. 26 (2005) 1838-1851). (f_y^2)_qq is the derivative of
+        the accelerations; w_0^2 is its median norm over the time of 256 ordinary adaptive steps, and epsilon
         the median of h w over these, at most 0.2. So ``tol`` is the local error of a typical step, and no
-        step is rejected. In reversible systems the energy does not drift and the way back leads to the
-        start, to rounding (`test_reversible`), as long as the motion is regular: chaos multiplies rounding,
-        and a close encounter with another time scale than the first steps is not controlled by ``tol``.
-        For positions and momenta, by a formula without the time; its sums are written out, so for a few
-        bodies. Fixed-point iteration.
+        step is rejected. In reversible systems the energy does not drift and the time-reversal error is at
+        round-off (`test_reversible`), as long as the motion is regular: chaos amplifies rounding errors, and
+        ``tol`` does not control a close encounter whose time scale differs from that of the first steps. For
+        systems of positions and momenta given by a formula without the time; its sums are unrolled, so for a
+        few bodies. Fixed-point iteration.
     precision : {"double", "double-double"}
-        ``"double-double"``: every number of a step is an unevaluated sum of two doubles, with 32 digits; with
-        ``s`` and ``h`` alone. About a hundred times slower, and 3 to 7 times slower than heyoka's
+        ``"double-double"``: every number of a step is an unevaluated sum of two doubles, with 32 digits; only
+        with ``s`` and ``h``. About a hundred times slower, and 3 to 7 times slower than heyoka's
         ``real128``. ``h``, the times and the parameters are the doubles given; ``integrate(..., start=)``
-        takes more digits of the start, `Solution.pairs` and `Solution.to_mpmath` return those of the states.
+        takes an initial state with more digits, `Solution.pairs` and `Solution.to_mpmath` return the states
+        with all digits.
         One trajectory, without events and variations, of a formula with ``sqrt``, ``sin``, ``cos``, ``tan``,
         ``exp``, ``log``, ``abs`` and arithmetic. Fixed-point iteration.
 
@@ -137,12 +135,12 @@ class Gauss(MethodBase):
         return 2 * self.s
 
     def as_hbvm(self) -> HBVM:
-        """Return the HBVM that this method is.
+        """Return the HBVM(s, s) that this method is identical to.
 
         Raises
         ------
         problems.errors.InputError
-            With ``steps`` or ``precision``, which HBVM does not have: it would take other steps.
+            With ``steps`` or ``precision``, which HBVM does not have.
         """
         for name in ("steps", "precision"):
             if name in self.options():
@@ -180,11 +178,11 @@ class Gauss(MethodBase):
         from integrators.extended.program import lacking  # numba is for those who integrate
 
         if (name := lacking(system)) is not None:
-            return f"its formula has {name}, which is not to be had in double-double; leave out precision=."
+            return f"its formula has {name}, which is not available in double-double; leave out precision=."
         return None
 
     def caveat(self, problem: Problem) -> str | None:
-        """Name a field with kinks that these options do not look for; see `HBVM`."""
+        """Return a warning for a field with kinks that these options do not look for; see `HBVM`."""
         why = blind(self.s, self.tol, self.solver)
         kinks = unseen(problem, why) if self.tol is None else unseen_in_time(problem, why)
         return kinks or unknown_kinks(problem, self.s, self.tol, self.breakpoints)

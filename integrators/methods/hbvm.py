@@ -43,37 +43,34 @@ class HBVM(MethodBase):
 
     * order 2s for every k >= s (`test_order`);
     * symmetric and perfectly A-stable: ``|R(iy)| = 1`` (`test_tableau`, `test_hbvm`);
-    * k = s is the Gauss-Legendre method, which is symplectic and keeps quadratic
-      invariants; with k > s it is neither (`test_energy`);
+    * k = s is the Gauss-Legendre method, which is symplectic and conserves quadratic invariants; methods with
+      k > s do not have these two properties (`test_energy`);
     * a polynomial Hamiltonian of degree nu is conserved to round-off if and only
       if k >= nu s / 2 (`test_energy`); any other smooth one in practice, once k is
       large enough that the quadrature error is below round-off (`test_sitnikov`).
 
-    With a tolerance the steps vary, each as long as its estimated local error allows.
-    This costs an energy-preserving method nothing, whereas a symplectic one, such as
-    Gauss, loses its long-time behaviour (`test_adaptive`). Without k and s these are
-    chosen too, by what a unit of time costs, for one trajectory and for many side by side
-    (`integrators.methods.automatic`), and the length of a step is bounded such that
-    the error of the quadrature, by which the energy changes, is at round-off. Stiff
-    systems run too: the method is A-stable, but it damps nothing, so that a transient that was
-    left at the size of the tolerance stays and keeps the steps shorter than those of a method
-    that damps it (`test_general`, Robertson's chemistry).
+    With a tolerance the step size is adaptive: each step is as long as its estimated local error allows. An
+    energy-conserving method can vary its steps without an energy drift; a symplectic one, such as Gauss,
+    cannot (`test_adaptive`). If k and s are not given, they are chosen to minimize the cost per unit of time,
+    for one trajectory or for many in SIMD lanes (`integrators.methods.automatic`), and the step size is
+    bounded such that the quadrature error, which changes the energy, is at round-off. Stiff systems can be
+    integrated: the method is A-stable, but it is not L-stable, so that a transient does not decay below the
+    tolerance and requires shorter steps than a method that damps it (`test_general`, Robertson's chemistry).
 
     Limits: energy is not accuracy. At a step too large for the trajectory the
-    energy is still conserved and the trajectory is wrong; other invariants, such
-    as the angular momentum, are kept only as far as the order does (`LineIntegral`
-    keeps several).
+    energy is still conserved and the trajectory is wrong; other invariants, such as the angular momentum, are
+    conserved only up to the error of the method (`LineIntegral` conserves several).
 
-    A step sees the field at its k nodes and nowhere else. With a tolerance, what lies
-    between them - a pulse in time, or a narrow bump of the force, that is shorter than the
-    step - is stepped over, and the run ends as finished: no estimate can tell. Where the
-    field has such places, give ``breakpoints`` (times) or ``max_step``. Jumps and kinks of
-    the field that nodes do see, such as those of ``m.abs`` and ``m.where``, are found, and steps cut until
-    they do not matter; the places are in ``stats.extra["kinks"]`` and the solution's
-    ``warnings`` say so. In adaptive steps (``tol``) the formulas tell where these and tables switch in
-    the state, so that weak kinks are found as well. In time, and in fields that are code, the nodes have to
-    show it: eight, or four on a formula with these, in steps that the fixed-point iteration solves.
-    Kinks are not looked for with ``h`` and on Poisson systems; of a field with these, ``warnings`` say so
+    A step evaluates the right-hand side only at its k nodes. A pulse or a narrow force shorter than the
+    distance between nodes may be missed, and no error estimate can detect it. For such right-hand sides give
+    ``breakpoints`` (times) or ``max_step``. Discontinuities of the right-hand side or of its derivative
+    (kinks) that affect the values at the nodes, such as those of ``m.abs`` and ``m.where``, are detected, and
+    the steps are shortened until their effect is negligible; ``stats.extra["kinks"]`` has their times, and
+    the solution's ``warnings`` report them. With adaptive steps (``tol``) the formula determines the states
+    at which these functions and tables switch, so that weak kinks are found as well. Switches in time, and
+    those of fields that are code, are detected from the values at the nodes: with at least eight nodes, or
+    four for a formula with these functions, in steps that the fixed-point iteration solves. With ``h``, and
+    for Poisson systems, kinks are not detected; ``warnings`` say so for a field that has them
     (`test_adaptive_steps`, `test_weak_kinks`).
 
     These equations do not conserve the energy of a Poisson system y' = B(y) grad H(y)
@@ -81,73 +78,73 @@ class HBVM(MethodBase):
 
         gamma_j = sum_l b_l P_j(c_l) B(Y_l) sum_i P_i(c_l) G_i
 
-    takes the place of the first: the same for constant B and for k = s, of the same
-    order, and the energy is conserved because B is skew-symmetric; the Casimirs of B are
-    not (``tests/integrators/kernel/line/test_poisson``).
+    replaces the first equation. It is identical for constant B and for k = s, has the same order, and
+    conserves the energy because B is skew-symmetric; it does not conserve the Casimirs of B
+    (``tests/integrators/kernel/line/test_poisson``).
 
     Parameters
     ----------
     k : int, optional
         Nodes of the quadrature, k >= s.
     s : int, optional
-        Degree of the polynomial, s >= 1; the order is 2s. Left out, together with k:
-        both are chosen, from ``tol`` and the system.
+        Degree of the polynomial, s >= 1; the order is 2s. Without k and s, both are chosen from ``tol`` and
+        the system.
     h : float, optional
-        Length of a step, > 0; integration backwards takes steps of -h. With ``tol``,
-        the first step's.
+        Step size, > 0; backward integration uses -h. With ``tol``, the initial step size.
     tol : float, optional
         Local error per step, relative to the size of each block of the state (the
         momenta of one body, else each component), as estimated by
-        ``h |gamma_s|^2 / max_j |gamma_j|``. The steps then vary. 3e-16 where neither
-        ``h`` nor ``tol`` is given: as accurate as double precision allows. In lanes
-        of an ensemble, whose methods have eight or twelve nodes, 1e-14 is that.
+        ``h |gamma_s|^2 / max_{j<=3} |gamma_j|``. The step size is then adaptive. Default: 3e-16 if ``h`` is
+        not given either, as accurate as double precision allows. In ensembles in SIMD lanes the default is
+        1e-14.
     solver : {"auto", "fixed_point", "newton", "blended"}
         How the stage equations are solved. The fixed-point iteration contracts while h
         times the largest frequency is below about s. ``"newton"``: simplified Newton
         with the stage system block-diagonalized, one complex matrix of the size of the
         system (of half its size for q'' = a(q)) per pair of stages, sparse where the
         system is large. ``"blended"``: blended iteration, one real matrix. ``"auto"``:
-        fixed point, and Newton from where that fails or takes a hundred iterations a
-        step until it would contract well again. With ``tol`` steps are as short as the
-        fixed point needs, until errors would allow so much longer ones that Newton's cost
-        less, four to twelve times; then Newton takes over. The Jacobian is traced, or taken
-        by differences; its factors are kept while they serve. ``stats`` tells which solver did
-        how much. Poisson systems: fixed point.
+        fixed-point iteration; Newton's method is used from where the iteration fails or needs a hundred
+        iterations per step until it would converge fast again. With ``tol`` the steps are short enough for
+        the fixed-point iteration until the error would allow steps four to twelve times as long, with which
+        Newton's method costs less; then Newton's method is used. The Jacobian is derived from the formula, or
+        approximated by differences; its factorization is reused as long as it converges. ``stats`` has the
+        number of steps of each solver. Poisson systems: fixed-point iteration.
 
     max_step : float, optional
-        Length that no step exceeds, > 0, in units of time; with ``tol``. For a field with pulses or
-        bumps that are shorter than the steps the estimate allows.
+        Maximum step size, > 0; with ``tol``. For a right-hand side with pulses that are shorter than the
+        steps that the error estimate allows.
     breakpoints : sequence of float, optional
         Times at which the right-hand side or one of its derivatives is discontinuous, in any order; with
-        ``tol``. A step ends at each of them that is passed, and nothing from before it is used after it.
-        The times at which formulas switch need not be given where they follow from conditions and
-        tables of anything affine in the time,
+        ``tol``. A step ends at each of them, and the next one uses no information from before it. Times at
+        which a formula switches need not be given if they follow from conditions and tables whose arguments
+        are affine in the time,
         such as ``m.where(t < par.c, ...)``, ``m.abs(2*t - 3)`` and ``m.table(t/par.T, ...)``.
     max_steps : int, optional
-        Steps of a trajectory from its start, at most; with ``tol``. A run that needs more ends
-        with the status ``max_steps``. By default any number.
+        Maximum number of steps of a trajectory; with ``tol``. A run that needs more ends with the status
+        ``max_steps``. Default: no limit.
     atol : float or sequence of float, optional
-        With ``tol``: local error per step, in the state's units, that is allowed whatever the size of the
-        block; one for all components, or one for each (of a block, and of one body, the smallest counts; of
-        q'' = a(q) those of the momenta). So a step is good enough where its error is at most
-        ``max(tol * size, atol)``. 0: errors are relative, always. By default the same, but where a step does
-        not become good enough by cutting it, as from rest, errors may there be relative to the
-        largest size that a block will reach in the interval, divided by how much errors grow on the way;
-        coarse further trajectories tell it.
+        With ``tol``: absolute tolerance of the local error per step, in the units of the state; one for all
+        components, or one for each (the smallest of a block, or of a body, is used; for q'' = a(q) those of
+        the momenta). A step is accepted if its error is at most ``max(tol * size, atol)``. 0: errors are
+        always relative. The default is 0, except where shorter steps do not reduce the relative error below
+        the tolerance, as at a start from rest: there errors may be relative to the largest size that a block
+        reaches in the interval, divided by the growth of errors until then, both estimated from coarse
+        auxiliary trajectories.
     projection : {"energy"}, optional
-        With ``tol`` and k > s: the stage equations are solved to a hundredth of the tolerance only, and the
-        end of each step is then moved to the energy H_0 of the start. With the gradient g of the energy H
+        With ``tol`` and k > s: the stage equations are solved only to a hundredth of the tolerance, and the
+        end of each step is then projected onto the initial energy H_0. With the gradient g of the energy H
         and the sizes s_i of the blocks,
 
             y_i <- y_i - s_i^2 g_i (H(y) - H_0) / sum_j (s_j g_j)^2,
 
-        repeated until the rest is rounding. This is for loose tolerances: a run takes about half the time,
-        since without it the energy needs equations solved to rounding and a quadrature whose error is
-        at rounding. The method is then a projection: the energy is put right, not conserved by the equations,
-        and says nothing about the trajectory, whose error follows the tolerance; the step is not symmetric,
-        and other invariants are kept only as far as the tolerance. Systems whose energy is a formula without
-        the time; no Poisson systems, no ``variations``. Trajectories of an ensemble go one by one, not in
-        lanes. States by ``sample="dense"`` are not projected. Left out: no projection (`test_projection`).
+        repeated until the residual is at round-off. For loose tolerances: a run takes about half the time,
+        since conservation without the projection requires stage equations and a quadrature that are accurate
+        to round-off. The energy is corrected by the projection, not conserved by the equations, and therefore
+        says nothing about the error of the trajectory, which follows the tolerance; the step is not
+        symmetric, and other invariants are conserved only to the tolerance. For systems whose energy is a
+        formula without the time; not for Poisson systems, and not with ``variations``. Trajectories of an
+        ensemble are integrated one after another, not in SIMD lanes. States by ``sample="dense"`` are not
+        projected. Default: no projection (`test_projection`).
 
     Raises
     ------
@@ -168,9 +165,9 @@ class HBVM(MethodBase):
     >>> from integrators import HBVM, integrate
     >>> problem = problems.load("henon_heiles", t_end=1000.0)
     >>> solution = integrate(problem, HBVM(k=6, s=4, h=0.5), [0.0, 1000.0])
-    >>> bool(solution.errors()["energy"].max() < 1e-14)  # of degree 3, so that 6 nodes do
+    >>> bool(solution.errors()["energy"].max() < 1e-14)  # degree 3: 6 nodes suffice
     True
-    >>> integrate(problem, HBVM(), [1000.0]).status  # chooses everything itself
+    >>> integrate(problem, HBVM(), [1000.0]).status  # automatic order and step size
     <Status.FINISHED: 'finished'>
     """
 
@@ -287,14 +284,14 @@ class HBVM(MethodBase):
 
             if self.k is not None and self.s is not None:
                 return program((self.k, self.s, None))
-            from integrators.methods.automatic import ACCURATE_IN_LANES, MANY, choose, choose_projected
+            from integrators.methods.automatic import ACCURATE_IN_LANES, WIDE, choose, choose_projected
 
             if self.projection:
                 return program(choose_projected(tol))
             alone, many = choose(system, tol), choose(system, tol, lanes=True)
             single = program(alone)
             if many != alone:
-                accurate = many[0] < MANY and tol == TOLERANCE
+                accurate = many[0] < WIDE and tol == TOLERANCE
                 single.for_many = lambda: program(many, ACCURATE_IN_LANES if accurate else tol)
             return single
         from integrators.kernel.program import HBVMProgram  # numba is for those who integrate

@@ -1,4 +1,4 @@
-"""Line integral methods that keep several invariants at once."""
+"""Line integral methods that conserve several invariants."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -52,7 +52,7 @@ class LineIntegral(MethodBase):
 
     Each invariant L_i changes by ``h sum_j phi_ij' sigma'_j``, which the second line
     makes 0 up to the error of the quadrature. As ``alpha = O(h^{2s})``, the order
-    of HBVM(k, s) is kept.
+    of HBVM(k, s) is preserved.
 
     Properties, each asserted in ``tests/integrators/kernel/line``:
 
@@ -82,16 +82,15 @@ class LineIntegral(MethodBase):
     s : int
         Degree of the polynomial, s >= 1; the order is 2s.
     h : float, optional
-        Length of a step, > 0; integration backwards takes steps of -h. With ``tol``,
-        the first step's.
+        Step size, > 0; backward integration uses -h. With ``tol``, the initial step size.
     tol : float, optional
         Local error per step, relative to the size of each block of the state (the
-        positions or the momenta of one body, else each component), as estimated by
-        ``h |gamma_s|^2 / max_j |gamma_j|``. The steps then vary.
+        positions or the momenta of one body, else each component), as estimated by ``h |gamma_s|^2 /
+        max_{j<=3} |gamma_j|``. The step size is then adaptive.
     atol : float or sequence of float, optional
-        With ``tol``: local error per step that is always allowed; see `HBVM`.
+        With ``tol``: absolute tolerance; see `HBVM`.
     invariants : sequence of str
-        What to keep: names of the problem's invariants, such as ``"energy"``; of a
+        Invariants to conserve: names of the problem's invariants, such as ``"energy"``; of a
         vector all components, or ``"lenz[1]"``, one.
 
     Raises
@@ -150,7 +149,7 @@ class LineIntegral(MethodBase):
         return 2 * self.s
 
     def accepts(self, problem: Problem) -> str | None:
-        """Accept every traced system that has the invariants."""
+        """Accept every system given by a formula that has these invariants."""
         if not problem.system.traced:
             return (
                 "it needs the field as a formula, beside those of its invariants; write it as a VectorField."
@@ -169,7 +168,7 @@ class LineIntegral(MethodBase):
         return unseen(problem, "line integral methods do not detect discontinuities")
 
     def conserved(self, system: System) -> dict[str, float]:
-        """Return the invariants that are kept, with a tolerance."""
+        """Return the invariants that are conserved, if the step size is adaptive."""
         tol, names = self.tol, system.invariants
         return {} if tol is None else {name: tol for name in self.invariants if name in names}
 

@@ -14,7 +14,7 @@ from types import ModuleType
 from problems.errors import MissingLibraryError
 
 UNTRACED = "it needs the field as a formula, not as a function; write it as a VectorField or Hamiltonian."
-"""Why libraries that take expressions refuse a `problems.Foreign`."""
+"""Why libraries that take expressions refuse an `problems.Opaque`."""
 
 WHEELS = {"heyoka": "Linux only", "scikit-sundae": "x86-64 only, and for macOS"}
 """Of libraries without wheels for some systems, for which there are some, as the extra ``peers`` says too."""

@@ -10,7 +10,7 @@ import numpy as np
 from integrators.options import NotNegative, Share
 from integrators.peers import load
 from integrators.protocol import Array, MethodBase, Status, UserError
-from integrators.running.watchdog import Crawl, crawl
+from integrators.running.watchdog import StallDetector, stall_detector
 from integrators.stepping import ProgramBase, StepperBase
 from problems.problem import System
 
@@ -183,7 +183,7 @@ class CVODEStepper(StepperBase):
         end = float(grid[-1])
         if how == "stop" and grid.size == 1 and not self._sign:
             return self._whole(end)
-        sign, watch = self._towards(end), crawl(self, self._tn, end)
+        sign, watch = self._towards(end), stall_detector(self, self._tn, end)
         states = np.empty((grid.size, self._y.size))
         for i, t in enumerate(grid.tolist()):
             while sign * (self._tn - t) < 0.0:
@@ -209,7 +209,7 @@ class CVODEStepper(StepperBase):
         return result.t[-1:], result.y[-1:]
 
     def _step_states(self, end: float) -> tuple[Array, Array]:
-        sign, watch = self._towards(end), crawl(self, self._tn, end)
+        sign, watch = self._towards(end), stall_detector(self, self._tn, end)
         times, states = [self._t], [self._y]
         while self._tn != times[-1] or self._step(watch):
             if sign * (self._tn - end) > 0.0:
@@ -220,7 +220,7 @@ class CVODEStepper(StepperBase):
 
     def _one_step(self) -> tuple[float, Array] | None:
         self._towards(self._t + (self._sign or 1) * self._far(self._t))
-        if self._tn == self._t and not self._step(Crawl(self._t, self._t)):
+        if self._tn == self._t and not self._step(StallDetector(self._t, self._t)):
             return None
         return self._tn, self._yn
 
@@ -229,7 +229,7 @@ class CVODEStepper(StepperBase):
         """Return how far CVODE is told to go: its first step depends on that, and must not on samples."""
         return max(1.0, abs(t))
 
-    def _step(self, watch: Crawl, stop: float | None = None) -> bool:
+    def _step(self, watch: StallDetector, stop: float | None = None) -> bool:
         """Take one step, not beyond ``stop``; return whether it succeeded."""
         before = self._tn
         end = before + self._sign * self._far(before) if stop is None else stop
@@ -253,7 +253,7 @@ class CVODEStepper(StepperBase):
             return False
         self._stats.steps += 1
         self._tn, self._yn = float(result.t), np.array(result.y, dtype=np.float64)
-        if stalled := watch.sees(self._tn):
+        if stalled := watch.update(self._tn):
             self._fail(Status.STALLED, self._tn, stalled)
         return not stalled
 

@@ -42,7 +42,7 @@ from problems import limits
 from problems.checks import File, Must, Word, checked_arguments
 from problems.errors import InputError, shown
 from problems.problem import Problem, System
-from problems.systems.untraced import Foreign
+from problems.systems.opaque import Opaque
 
 DEFAULT_SAMPLES = 1001
 SECONDS = 60.0  # from one file to the next
@@ -72,47 +72,49 @@ def integrate(
 ) -> Solution:
     """Integrate ``problem`` with ``method`` and return the states at ``times``.
 
-    Ctrl-C ends the integration: what was reached is returned, with the status ``INTERRUPTED``.
+    Ctrl-C ends the integration: the states computed so far are returned, with the status ``INTERRUPTED``.
 
     Parameters
     ----------
     problem : Problem
-        What to integrate.
+        The problem to integrate.
     method : MethodBase, optional
-        How: ``HBVM(k=8, s=4, h=0.1)``, ``Taylor(tol=1e-15)``, ... Default: ``HBVM()``, which
-        chooses everything itself.
+        The method: ``HBVM(k=8, s=4, h=0.1)``, ``Taylor(tol=1e-15)``, ... Default: ``HBVM()``, which chooses
+        its order and step size automatically.
     times : array_like, shape (n,), or float, optional
-        Strictly monotone times, from the problem's ``t0`` on (or back). One number is the end: 1001
-        equidistant times to it. Default: the problem's own grid, or else such times to ``t_end``.
+        Output times, strictly monotone from the problem's ``t0`` on (forward or backward). One number is the
+        end of 1001 equidistant times. Default: the problem's ``times``, or else 1001 equidistant times to
+        ``t_end``.
     sample : {"partial", "steps", "stop", "dense"}, optional
-        How states between the method's steps are made; see `Stepper.advance`.
+        How states between the method's steps are computed; see `Stepper.advance`.
     events : Event or callable, or a sequence of them, optional
-        Functions of time and state, and what happens where they vanish: see
-        `integrators.events.Event`. They change nothing of the steps and samples, but a
-        terminal event ends them. They are looked for in the steps themselves;
-        ``stats.extra["event_search"]`` counts the partial steps that they take.
+        Functions of time and state whose zeros are located: see `integrators.events.Event`. They do not
+        affect the steps; a terminal event ends the integration. Zeros are located by partial steps, which
+        ``stats.extra["event_search"]`` counts.
     variations : array_like, shape (dim, n), or str, or sequence of str, optional
-        Tangent vectors at the start, or what to differentiate the trajectory with respect to: ``"y0"`` (dim
-        vectors), ``"t0"`` (one), names of parameters (one for each number; the start stays where it is).
-        ``solution.variations`` has them at the samples. They are the exact derivatives of the steps that
-        are taken, with the steps' lengths held fixed; ``"t0"`` begins with minus the field at the start.
+        Initial tangent vectors, or the quantities with respect to which the trajectory is differentiated:
+        ``"y0"`` (dim vectors), ``"t0"`` (one), names of parameters (one for each number; the initial state is
+        fixed). ``solution.variations`` has them at the samples. They are the exact derivatives of the steps
+        that are taken, with fixed step sizes; ``"t0"`` starts with minus the right-hand side at the initial
+        state.
         `Solution.variations_at` has them at any time. For HBVM and Gauss, and problems with a formula.
     start : array_like, shape (dim,) or (dim, 2), optional
-        The problem's start with more digits than doubles have, for ``Gauss(..., precision="double-double")``:
-        numbers of mpmath, or pairs of doubles. Rounded to doubles it must be the problem's.
+        The initial state with more digits than doubles have, for ``Gauss(..., precision="double-double")``:
+        numbers of mpmath, or pairs of doubles. Rounded to doubles it must be that of the problem.
     progress : bool or callable, optional
-        True: a bar on the terminal, if there is one. A function: it is called about ten times a second
-        with an `integrators.Progress`.
+        True: show a progress bar on a terminal. A function: it is called about ten times a second with an
+        `integrators.Progress`.
     checkpoint : path, optional
-        A file that is written every so many seconds, when the integration ends, and at Ctrl-C: what the
-        continuation depends on, and the samples until then. It is always whole, whenever the process ends.
+        Path of a checkpoint file, written every ``every_seconds`` seconds, at the end of the integration, and
+        at Ctrl-C, with the samples computed so far. The file is replaced atomically.
     every_seconds : float
-        Seconds from one file to the next, at least. A file that cannot be written, as on a full disk,
-        ends nothing: the solution warns of it.
+        Minimum time between two checkpoints, in seconds. If a file cannot be written, as on a full disk, the
+        integration continues and the solution has a warning.
     resume : path, optional
-        Go on from the checkpoint in this file, of the same problem, method, times, sampling and events: the
-        solution is bitwise identical to one without the break. If there is no such file and ``checkpoint`` is
-        the same path, begin at the beginning. Only give a file that you made: it is a pickle.
+        Continue from the checkpoint in this file, of the same problem, method, times, sampling and events:
+        the solution is bitwise identical to one without an interruption. If there is no such file and
+        ``checkpoint`` is the same path, start from the beginning. Only load files that you trust: a
+        checkpoint is a pickle.
 
     Returns
     -------
@@ -124,8 +126,9 @@ def integrate(
         If the method does not accept the problem, or for times, samplings, events,
         initial states and files that cannot be used.
     Exception
-        What a `problems.Foreign` field raises in the very first step. Later errors, and those of an event's
-        function, end the integration as ``USER_ERROR``, with the trajectory up to there.
+        An exception raised by an `problems.Opaque` field in the first step. Later exceptions, and those of an
+        event's function, end the integration with the status ``USER_ERROR``; the trajectory up to there is
+        returned.
 
     Examples
     --------
@@ -249,7 +252,7 @@ def integrate(
     if error is not None and stepper.t == problem.t0:  # nothing is reached that could be kept
         raise error
     stats = stepper.stats if before is None else both(before, stepper.stats)
-    if isinstance(problem.system, Foreign):
+    if isinstance(problem.system, Opaque):
         stats.extra = {**stats.extra, "field": problem.system.written}
     if watch is not None and watch.failure:
         stats.extra = {**stats.extra, "checkpoint": watch.failure}

@@ -1,4 +1,4 @@
-"""Integrate one problem from many starts, or with many values of its parameters."""
+"""Integrate one problem from many initial conditions, or with many values of its parameters."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext, suppress
@@ -47,7 +47,7 @@ from problems.problem import Problem
 from problems.systems.base import System
 
 FIRST = 64  # trajectories for each thread, of the first piece
-SHARES, MOST = 64, 4096  # pieces for an executor, and trajectories of one
+SHARES, LARGEST_PIECE = 64, 4096  # pieces for an executor, and trajectories of one
 NUMBERS = 2**22  # of the states of a piece that is reduced
 # Seconds of a piece, about, where nobody is told of it: lanes are idle at its end, and Ctrl-C loses it.
 UNWATCHED = 0.5
@@ -73,72 +73,75 @@ def integrate_many(
     checkpoint: File | None = None,
     resume: File | None = None,
 ) -> Solutions:
-    """Integrate ``problem`` from many starts, with parameters that may differ.
+    """Integrate ``problem`` from many initial conditions, with parameters that may differ.
 
-    Trajectories of HBVM and Gauss with up to 16 stages go one in each lane of the vector unit; those
-    of heyoka go through its batch integrator; all others one by one. What comes out for a
-    trajectory depends neither on the others nor on their order or the number of threads; it is
-    what `integrate` gives, up to rounding, or up to the tolerance where steps vary. Ctrl-C ends the
-    integration: what was reached is returned, and the trajectories that are missing have the status
-    ``INTERRUPTED``.
+    HBVM and Gauss with up to 16 stages integrate one trajectory in each SIMD lane; heyoka uses its batch
+    integrator; trajectories of other methods are integrated one after another. The result of a trajectory
+    depends neither on the others nor on their order or the number of threads; it agrees with that of
+    `integrate` up to rounding, or up to the tolerance with adaptive steps. Ctrl-C ends the integration:
+    finished trajectories are returned, and the others have the status ``INTERRUPTED``.
 
     Parameters
     ----------
     problem : Problem
-        What to integrate, and the values of whatever is not given here.
+        The problem to integrate, with default values of the arguments that are not given here.
     method : MethodBase, optional
-        How; ``HBVM()`` by default.
+        The method; ``HBVM()`` by default.
     starts : array_like, shape (n, dim), optional
-        States to start from: q then p for Hamiltonian problems. The problem's own by default.
+        Initial states: q then p for Hamiltonian problems. Default: that of the problem.
     parameters : mapping of str to array_like, optional
         Values by name: n numbers, or one for all; of a parameter that is a list, n lists, or one.
     times : array_like, shape (m,) or (n, m), optional
-        Strictly monotone times, from the problem's ``t0`` on (or back), of all or of each: a row may end with
-        NaN where it has fewer. The end of its span by default. Trajectories with times of their own go
-        one by one, as `integrate` does, or one in each thread.
+        Output times, strictly monotone from the problem's ``t0`` on (forward or backward), for all
+        trajectories or for each: shorter rows end with NaN. Default: the end of the problem's interval.
+        Trajectories with different times are integrated one after another, as by `integrate`, or one in each
+        thread.
     threads : int
-        Threads to share the work among. Other methods than HBVM and Gauss use one.
+        Number of threads. Methods other than HBVM and Gauss use one.
     progress : bool or callable
-        Whether to show a bar on a terminal; or what is called now and then, in this thread, with an
-        `integrators.Progress`: the part of the trajectories that are at their end, and their steps.
+        True: show a progress bar on a terminal. A function: it is called repeatedly, in this thread, with an
+        `integrators.Progress`: the fraction of finished trajectories, and their steps.
     events : Event or callable, or a sequence of them, optional
-        What to look for, as in `integrate`. Trajectories then go one by one, or one in each thread, and a
-        terminal event ends its own: what of ``times`` comes later is NaN.
+        Events, as in `integrate`. Trajectories are then integrated one after another, or one in each thread.
+        A terminal event ends its trajectory; states at later times are NaN.
     backend : {"jax"}, optional
         Integrate on JAX's default device, such as a GPU: HBVM and Gauss with a fixed step. Needs diffrax.
     sample : {"partial", "steps", "stop", "dense"}, optional
-        As for `integrate`; trajectories then go one by one. With ``"steps"``, the ends of the steps of
-        each, up to the last time: ``t`` has the shape (n, m), and NaN after the last step of each.
+        As for `integrate`; trajectories are then integrated one after another. With ``"steps"``, the ends of
+        the steps of each, up to the last time: ``t`` has the shape (n, m), and NaN after the last step of
+        each.
     reduce : mapping of str to Reduction, optional
-        What to keep in place of the states, by name: see `integrators.reduce`. Of the states only the last
-        ones are kept. A mean depends on ``piece`` in its last digits; nothing depends on threads or workers.
+        Reductions to compute in place of the states, by name: see `integrators.reduce`. Only the last states
+        are stored. The last digits of a mean depend on ``piece``; the results do not depend on threads or
+        workers.
     variations : array_like, shape (dim, k) or (n, dim, k), or str, or sequence of str, optional
         As for `integrate`, at the start of each trajectory, or tangent vectors of each: ``variations`` of
-        the result has the shape (n, m, dim, k). Trajectories then go one by one, or one in each thread.
+        the result has the shape (n, m, dim, k). Trajectories are then integrated one after another, or one in
+        each thread.
     executor : concurrent.futures.Executor, optional
-        Who integrates: a ``ProcessPoolExecutor``, ``dask.distributed.Client().get_executor()``, ... A piece
-        whose worker dies is sent once more; if that fails, its trajectories are ``INTERRUPTED``.
+        Executor that runs the integrations: a ``ProcessPoolExecutor``,
+        ``dask.distributed.Client().get_executor()``, ... A piece whose worker dies is submitted once more; if
+        that fails, its trajectories have the status ``INTERRUPTED``.
     piece : int, optional
-        Trajectories that are integrated together: with ``executor`` by default a 64th of all, between 1 and
-        4096; with ``reduce`` as many as have 2**22 numbers.
+        Number of trajectories that are integrated together. Default: with ``executor`` a 64th of all, between
+        1 and 4096; with ``reduce`` as many as have 2**22 numbers.
     checkpoint : path, optional
-        A file that is written every minute and at the end, with all trajectories until then.
+        Path of a checkpoint file, written every minute and at the end, with all trajectories computed so far.
     resume : path, optional
-        Go on from the checkpoint in this file, of the same ensemble, method and times: what is
-        ``INTERRUPTED`` in it is integrated now, the rest is as it was. If there is no such file and
-        ``checkpoint`` is the same path, begin at the beginning. Only give a file that you made: it is a
-        pickle.
+        Continue from the checkpoint in this file, of the same ensemble, method and times: its ``INTERRUPTED``
+        trajectories are integrated, the others are taken from it. If there is no such file and ``checkpoint``
+        is the same path, start from the beginning. Only load files that you trust: a checkpoint is a pickle.
 
     Returns
     -------
     Solutions
-        A trajectory that fails has its status, reason and time, and leaves the others alone.
+        A trajectory that fails has its status, reason and time, and does not affect the others.
 
     Raises
     ------
     problems.errors.InputError
-        If the method does not accept the problem, or for starts, parameters, times, threads or a backend
-        that cannot be used.
+        If the method does not accept the problem, or for initial states, parameters, times, threads or a
+        backend that cannot be used.
 
     Examples
     --------
@@ -270,7 +273,7 @@ def _fixed_size(piece: int | None, executor: Any, reduce: Any, n: int, numbers: 
     if piece is not None:
         return piece
     if executor is not None:
-        return max(1, min(-(-n // SHARES), MOST))
+        return max(1, min(-(-n // SHARES), LARGEST_PIECE))
     return max(1, NUMBERS // numbers) if reduce else None
 
 

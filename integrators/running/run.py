@@ -1,4 +1,4 @@
-"""A trajectory that is taken step by step, and changed between steps."""
+"""An integration that is advanced step by step, and may be changed between steps."""
 
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -28,18 +28,18 @@ def start(
     *,
     start: Any = None,
 ) -> "Run":
-    """Return a trajectory at the problem's start, which is then taken step by step.
+    """Start an integration that is then advanced step by step.
 
     Parameters
     ----------
     problem : Problem
-        What to integrate. Its end is none here, and tells only how long a first step may be.
+        The problem to integrate. Its ``t_end`` only bounds the first step.
     method : MethodBase, optional
-        How; ``HBVM()`` by default.
+        The method; ``HBVM()`` by default.
     events : Event or callable, or a sequence of them, optional
-        What to look for in the steps; see `integrators.events.Event`.
+        Events to locate; see `integrators.events.Event`.
     start : array_like, shape (dim,) or (dim, 2), optional
-        The problem's start with more digits than doubles have; see `integrate`.
+        The initial state with more digits than doubles have; see `integrate`.
 
     Returns
     -------
@@ -48,7 +48,7 @@ def start(
     Raises
     ------
     problems.errors.InputError
-        If the method does not accept the problem, or cannot find events.
+        If the method does not accept the problem, or does not support events.
 
     Examples
     --------
@@ -68,15 +68,15 @@ def start(
 
 
 class Run:
-    """A trajectory under way; `start` makes it.
+    """An integration in progress; `start` returns it.
 
-    Its steps are those of `integrate` to the problem's end, bit for bit, and so are the states at other
-    times. The state and the parameters can be set between steps: the method then begins anew, at this time.
+    Its steps, and its states at other times, are bitwise identical to those of `integrate` to the problem's
+    end. The state and the parameters can be set between steps: the method then restarts at this time.
 
     Attributes
     ----------
     problem, method
-        What is integrated, and how.
+        The problem, and the method.
 
     Examples
     --------
@@ -124,12 +124,12 @@ class Run:
 
     @property
     def t(self) -> float:
-        """The present time."""
+        """The current time."""
         return self._stepper.t if self._shown is None else self._shown[0]
 
     @property
     def y(self) -> Array:
-        """The present state, shape (dim,), q then p; it can be set, as a whole."""
+        """The current state, shape (dim,), q then p; it can be set as a whole."""
         return _frozen(self._stepper.y if self._shown is None else self._shown[1])
 
     @y.setter
@@ -139,10 +139,10 @@ class Run:
 
     @property
     def pairs(self) -> Array:
-        """The present state with twice the digits of a double, shape (dim, 2), at exactly the time ``t``.
+        """The current state with twice the digits of a double, shape (dim, 2), at exactly the time ``t``.
 
-        It can be set, as pairs or as numbers of mpmath, for ``Gauss(..., precision="double-double")``. A step
-        may end a rounding error of ``t`` away, so the last bits of ``y`` may be others.
+        It can be set, as pairs or as numbers of mpmath, for ``Gauss(..., precision="double-double")``. The
+        end of a step may differ from ``t`` by a rounding error, so the last bits of ``y`` may differ.
 
         Raises
         ------
@@ -166,7 +166,7 @@ class Run:
         self._anew(as_pairs(state, self.problem.system.dim, label="pairs"))
 
     def to_mpmath(self) -> NDArray[Any]:
-        """Return the present state as numbers of mpmath, exactly; shape (dim,).
+        """Return the current state as numbers of mpmath, exactly; shape (dim,).
 
         Raises
         ------
@@ -194,7 +194,7 @@ class Run:
 
     @property
     def status(self) -> Status:
-        """How it stands: ``RUNNING``, ``EVENT`` after a terminal event, or why it failed."""
+        """Status: ``RUNNING``, ``EVENT`` after a terminal event, or the kind of failure."""
         return self._stepper.status
 
     @property
@@ -204,7 +204,7 @@ class Run:
 
     @property
     def events(self) -> dict[str, Occurrences]:
-        """What was found in the steps so far, by name."""
+        """Occurrences of the events so far, by name."""
         if not self._wanted:
             return {}
         parts = [*self._before, self._stepper.search.hits.occurrences()]
@@ -223,9 +223,9 @@ class Run:
         }
 
     def step(self) -> Status:
-        """Take a step of the method's own length; after a failure or a terminal event do nothing.
+        """Take one step of the method; after a failure or a terminal event do nothing.
 
-        After `until` that is the rest of the step in which that time lies.
+        After `until` it is the remainder of the step that contains that time.
         """
         if self._stepper.status is Status.RUNNING:
             self._stepper.step()
@@ -233,11 +233,11 @@ class Run:
         return self._stepper.status
 
     def until(self, t: float) -> Array:
-        """Go to a time, ahead or back, and return the state there.
+        """Integrate to a time, forward or backward, and return the state there.
 
-        The method's steps do not depend on it: the state is what `integrate` returns for this time, and the
-        next step goes on to where it would have ended. Where the method fails before, `status` and `reason`
-        say so, and the time and the state are those that were reached.
+        The method's steps do not depend on it: the state is that of `integrate` at this time, and the next
+        step ends where it would have ended without the call. If the method fails before, `status` and
+        `reason` describe the failure, and the time and the state are those that were reached.
 
         Parameters
         ----------
@@ -251,7 +251,7 @@ class Run:
         Raises
         ------
         problems.errors.InputError
-            If it is no finite number.
+            If ``t`` is not a finite number.
         """
         (goal,) = check_times([t], self.t).tolist()
         if self._stepper.status is Status.RUNNING and goal != self.t:
@@ -260,12 +260,12 @@ class Run:
         return self.y
 
     def energy(self) -> float:
-        """Return the energy at the present state, with the present parameters.
+        """Return the energy of the current state, with the current parameters.
 
         Raises
         ------
         problems.errors.InputError
-            If the system has none that is conserved.
+            If the system has no conserved energy.
         """
         system = self.problem.system
         if "energy" not in system.invariants:

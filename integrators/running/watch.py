@@ -1,4 +1,4 @@
-"""A long integration, watched: how far it is, what is kept of it in a file, and Ctrl-C."""
+"""Progress, checkpoint files and Ctrl-C of long integrations."""
 
 import hashlib
 import io
@@ -24,24 +24,25 @@ from problems.problem import Problem
 from problems.systems.code_digest import code_digest
 
 MAGIC, VERSION = b"hbvm-bench checkpoint ", 2
+FORMER_PROBLEM = "Problem(Foreign("  # as files of versions before 0.2 name one of a `problems.Opaque`
 SOON = 0.1  # seconds from one look to the next, about
 
 
 @dataclass(frozen=True)
 class Progress:
-    """How far an integration is.
+    """Progress of an integration.
 
     Attributes
     ----------
     t : float
-        Where it is.
+        The time reached.
     fraction : float
-        Of the way, from 0 to 1.
+        Completed fraction, from 0 to 1.
     steps : int
-        Steps until now.
+        Steps so far.
     seconds, left : float
-        Since it began, or was resumed; and until its end, if it goes on as fast: infinite as long as
-        nothing is known of that.
+        Seconds since the start or the resumption, and the estimated remaining seconds; infinite as long as
+        there is no estimate.
 
     Examples
     --------
@@ -198,6 +199,8 @@ def read(path: str | os.PathLike[str], wanted: Mapping[str, str]) -> dict[str, A
             f"{where} is a checkpoint of format {version}, and this version reads "
             f"{' and '.join(map(str, READERS))}; resume it with the version that wrote it."
         )
+    if str(stored.get("problem")).startswith(FORMER_PROBLEM):
+        stored["problem"] = stored["problem"].replace(FORMER_PROBLEM, "Problem(Opaque(", 1)
     for key, value in wanted.items():
         if stored.get(key) != value:
             other = f"{stored.get('method')} on {stored.get('problem')}"

@@ -1,4 +1,4 @@
-"""When adaptive steps have collapsed: the same rule for every method."""
+"""Detection of stalled integrations and of blow-up: the same rule for every method with adaptive steps."""
 
 import math
 from typing import Protocol
@@ -46,8 +46,8 @@ def collapsed(way: float, left: float, before: float, steps: float) -> bool:
     return way < SMALL_SHARE * left and way * steps < SLOWER * before * CRAWL_STEPS
 
 
-class Crawl:
-    """Sees that an adaptive method no longer gets anywhere, from its own times.
+class StallDetector:
+    """Detects that an adaptive method has stalled or that the solution blows up, from the times of its steps.
 
     Twice as many steps cover twice the way where steps keep their length, and as much
     again where the solution oscillates exponentially faster. Where they cover less and less,
@@ -58,7 +58,7 @@ class Crawl:
     Parameters
     ----------
     t, end : float
-        Where it is and where it shall go.
+        Current time, and end of the integration.
     """
 
     _count = _total = _seen = 0
@@ -74,13 +74,13 @@ class Crawl:
         """Steps to take before the next look."""
         return min(max(self._look - self._total, 1), LONGEST_WITHOUT_A_LOOK)
 
-    def sees(self, t: float, steps: int = 1, size: float = math.nan) -> str:
-        """Take note of ``steps`` steps that came to ``t``, where the state is of size ``size``.
+    def update(self, t: float, steps: int = 1, size: float = math.nan) -> str:
+        """Record ``steps`` steps that reached ``t``, where the state has the size ``size``.
 
         Returns
         -------
         str
-            The reason if they crawl, else "".
+            The reason if the integration has stalled, else "".
         """
         self._total += steps
         self._count += steps
@@ -92,6 +92,8 @@ class Crawl:
         if not collapsed(abs(t - mark), abs(self._end - mark), abs(mark - self._start), self._total - count):
             return ""
         return f"{count} steps from t = {mark!r} only came to t = {t!r}: the steps have collapsed."
+
+    sees = update  # its name in the kernel
 
     def _blows_up(self, t: float, size: float) -> str:
         way, share = t - self._looked, abs(t - self._looked) / abs(self._way) if self._way else math.inf
@@ -114,21 +116,24 @@ class Watched(Destination, Protocol):
 
     Attributes
     ----------
-    crawl : Crawl or None
-        What watches it, where it has a destination; kept here from piece to piece.
+    crawl : StallDetector or None
+        Its detector, if it has a destination; kept here from piece to piece.
     """
 
-    crawl: Crawl | None
+    crawl: StallDetector | None
 
 
-def crawl(stepper: Watched, t: float, end: float) -> Crawl:
-    """Return what watches a stepper on its way from ``t`` to ``end``.
+def stall_detector(stepper: Watched, t: float, end: float) -> StallDetector:
+    """Return the stall detector of a stepper on its way from ``t`` to ``end``.
 
-    Where somebody has it go piece by piece, to its attribute ``destination``, one watch serves all the
-    pieces, and what is a small share of the way is measured by the whole of it.
+    If the integration to its attribute ``destination`` is done in pieces, one detector is used for all of
+    them, and progress is measured relative to the whole interval.
     """
     if stepper.destination is None:
-        return Crawl(t, end)
+        return StallDetector(t, end)
     if stepper.crawl is None:
-        stepper.crawl = Crawl(t, stepper.destination)
+        stepper.crawl = StallDetector(t, stepper.destination)
     return stepper.crawl
+
+
+Crawl, crawl = StallDetector, stall_detector  # their names in the kernel

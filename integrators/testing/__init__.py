@@ -1,4 +1,4 @@
-"""The conformance kit: checks that any method, ours or a third party's, can be run through.
+"""The conformance kit: checks for any method.
 
 With pytest, one test per check::
 

@@ -36,7 +36,7 @@ from integrators.protocol import (
 from integrators.running.integrate import integrate
 from integrators.testing.checkpoints import checkpoints_continue_bit_for_bit
 from integrators.testing.rules import finished, irregular, raises, regular, require, start
-from problems import Foreign, Problem
+from problems import Opaque, Problem
 from problems.errors import InputError
 
 BATCH_BOUND = 1e-6
@@ -51,7 +51,7 @@ ROUNDING = 1e-13
 DIFFERENCE, DIFFERENCE_BOUND = 1e-5, 1e-4
 """Relative distance of two starts, and largest error of their difference quotient as a derivative."""
 
-FEW = 64  # steps of a record
+RECORDED_STEPS = 64  # steps of a record
 ADJOINT_BOUND = 1e-9
 """Largest relative difference between a gradient by tangent vectors and by the adjoint of the same steps
 (measured: 1e-15)."""
@@ -87,7 +87,7 @@ def samplings_are_as_stated(method: MethodBase, problem: Problem) -> str | None:
 
 
 def a_destination_leaves_the_samples_alone(method: MethodBase, problem: Problem) -> str | None:
-    """Check that pieces on the way to a destination have the bits of one call."""
+    """Check that pieces on the way to a destination are bitwise identical to one call."""
     if not offers(start(method, problem), Destination):
         return "it takes no destination"
     grid = irregular(problem)
@@ -112,7 +112,7 @@ def keeps_the_error_of_a_user_s_function(method: MethodBase, problem: Problem) -
             raise raised
         return [y[1], -y[0]]
 
-    swing = Problem(Foreign(field, dim=2), y0=[1.0, 0.0], t_end=6.0)
+    swing = Problem(Opaque(field, dim=2), y0=[1.0, 0.0], t_end=6.0)
     if (refusal := method.accepts(swing)) is not None:
         return refusal
     stepper = start(method, swing)
@@ -192,7 +192,7 @@ def comes_back_when_it_is_stopped(method: MethodBase, problem: Problem) -> str |
 
 
 def comes_back_after_its_time(method: MethodBase, problem: Problem) -> str | None:
-    """Check that pieces made within a limit of time have the bits of one call."""
+    """Check that pieces within a time limit are bitwise identical to one call."""
     stepper: Any = start(method, problem)
     if not offers(stepper, TimeLimit):
         return "it has no limit of time"
@@ -244,9 +244,9 @@ def adjoints_are_what_tangents_say(method: MethodBase, problem: Problem) -> str 
         return str(refusal)
     tapes: list[Any] = []
     while not tapes or len(tapes[-1]):  # the last one is of the partial step that is left
-        tapes.append(stepper.recorder(FEW))
+        tapes.append(stepper.recorder(RECORDED_STEPS))
         stepper.record(tapes[-1])
-        stepper.march(end, FEW)
+        stepper.march(end, RECORDED_STEPS)
     samples = stepper.advance([end])
     plain = followed.advance([end])
     require(np.array_equal(samples.y, plain.y), "the trajectory is bitwise identical when it is recorded")
@@ -283,7 +283,7 @@ def batches_are_single_trajectories(method: MethodBase, problem: Problem) -> str
 
 
 def prepared_batches_are_batches(method: MethodBase, problem: Problem) -> str | None:
-    """Check that a batch that was prepared has the bits of one that was not."""
+    """Check that a prepared batch is bitwise identical to one that was not prepared."""
     program: Any = method.compile(problem.system)
     if not offers(program, PreparedBatches):
         return "it prepares no batches"
@@ -292,7 +292,7 @@ def prepared_batches_are_batches(method: MethodBase, problem: Problem) -> str | 
 
 
 def threads_change_no_bits(method: MethodBase, problem: Problem) -> str | None:
-    """Check that a batch in two threads has the bits of one."""
+    """Check that a batch in two threads is bitwise identical to one in a single thread."""
     program: Any = method.compile(problem.system)
     if not (offers(program, Threads) and program.threaded):
         return "its batches take no threads"

@@ -38,7 +38,7 @@ def hamiltonian(
     parameters : mapping of str to float
         Names and default values of all other names in it.
     invariants : mapping of str to str
-        Further quantities that are kept, as text too.
+        Further conserved quantities, as text.
     name : str
         The system's name.
 
@@ -91,10 +91,9 @@ def expression(
     parameters: Annotated[str, Must('text, such as "k=2, m=0.5"')] = "",
     t_end: float = 100.0,
 ) -> Problem:
-    """Return a problem of your own, its Hamiltonian given as text.
+    """Return a problem whose Hamiltonian is given as text.
 
-    Tests whatever you want to know, such as
-    ``expression(H="(p1^2 + p2^2)/2 + q1^2*q2^2", q0=[0.5, 1.0], p0=[0.0, 0.3])``.
+    Such as ``expression(H="(p1^2 + p2^2)/2 + q1^2*q2^2", q0=[0.5, 1.0], p0=[0.0, 0.3])``.
 
     Parameters
     ----------
@@ -102,7 +101,7 @@ def expression(
         The energy, in ``q`` and ``p`` or ``q1, p1, q2, ...``, the time ``t``, ``pi`` and parameters;
         with + - * /, powers ``^`` and the elementary functions of one argument.
     q0, p0 : sequence of float
-        The start, as many numbers as there are degrees of freedom.
+        The initial state, as many numbers as there are degrees of freedom.
     parameters : str
         Values of the other names in ``H``: ``"k=2, m=0.5"``.
     t_end : float

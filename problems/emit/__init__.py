@@ -1,7 +1,7 @@
-"""One traced system to source for numpy, numba, JAX and heyoka: the same operations, in the writer's order.
+"""Source code of a traced system for NumPy, numba, JAX and heyoka.
 
-JAX is the exception: what it receives of a declared sum that stays a loop is one reduction over an array,
-whose order of additions is the library's own.
+All receive the same operations in the same order, except that JAX reorders long sums: an indexed sum that
+remains a loop becomes one reduction over an array.
 """
 
 import hashlib
@@ -27,7 +27,7 @@ from problems.emit.plan import SMALL, make_plan
 from problems.errors import InputError, MissingLibraryError, shown, unknown
 from problems.systems.base import System
 from problems.systems.code_digest import code_digest
-from problems.systems.untraced import Foreign
+from problems.systems.opaque import Opaque
 from problems.trace.functions import FUNCTIONS, SLOW
 from problems.trace.graph import reachable
 
@@ -52,7 +52,7 @@ class Source:
     ----------
     text : str
         One function, preceded by its index tables (``TABLE_0 = np.array(...)``)
-        where a declared sum is a loop over a list.
+        where an indexed sum is a loop over a list.
     name : str
         The function's name.
     sha256 : str
@@ -87,8 +87,8 @@ def source(system: System, quantity: Quantity, backend: str, *, limit: int | Non
         `math` as globals; works unchanged on lanes. numpy: the same signature
         on arrays. jax: ``def name(t, y, par)``. heyoka: ``def name(t, y, par, hy)``.
     limit : int or None
-        Largest number of operations of a declared sum that is written out term
-        by term; ``None``: all (always so for heyoka), 0: none.
+        Largest number of operations of an indexed sum that is unrolled; ``None``: all (always for heyoka), 0:
+        none.
 
     Raises
     ------
@@ -127,10 +127,10 @@ def _written(function: Function, name: str, backend: str, limit: int | None) -> 
 def fingerprint(system: System) -> str:
     """Return the SHA-256 of a system's field: its structure, not its parameters' values.
 
-    Of a `Foreign` system it is that of its function's code, and of what that takes from around it.
+    For an `Opaque` system it is that of its function's code and of the values that the function uses.
     """
     if system not in _fingerprints:
-        if isinstance(system, Foreign):
+        if isinstance(system, Opaque):
             digest = code_digest(system.f, system.dim, system.name)
         else:
             emitted = source(system, "field", "numba")
@@ -153,14 +153,14 @@ def numpy(system: System, quantity: Quantity, *, limit: int | None = SMALL) -> C
     ``y`` is (dim,) or (dim, n), the result (m,) or (m, n), of long doubles if ``y`` is of these.
     Division by zero and the like give inf and nan, in silence, as in compiled code. ``limit`` as in `source`.
     """
-    if isinstance(system, Foreign) and quantity == "field":
-        return partial(_foreign_on_arrays, system)
+    if isinstance(system, Opaque) and quantity == "field":
+        return partial(_opaque_on_arrays, system)
     function = _function(system, quantity)
     return _on_arrays(source(system, function, "numpy", limit=limit), len(function.outputs))
 
 
 def numpy_of(function: Function, name: str, *, limit: int | None = SMALL) -> Callable[..., np.ndarray]:
-    """Return a function that is none of a system's own, such as one of `System.trace`, like `numpy`."""
+    """Return a further function of a system, such as one of `System.trace`, as `numpy` does."""
     return _on_arrays(_written(function, name, "numpy", limit), len(function.outputs))
 
 
@@ -171,7 +171,7 @@ def numba_of(function: Function, name: str) -> tuple[str, Callable[..., Any]]:
     return emitted.text, _executed(emitted, namespace)
 
 
-def _foreign_on_arrays(system: Foreign, t: Any, y: Any, par: Any) -> np.ndarray:
+def _opaque_on_arrays(system: Opaque, t: Any, y: Any, par: Any) -> np.ndarray:
     states = np.asarray(y, dtype=np.float64)
     columns = np.ascontiguousarray(np.atleast_2d(states.T))
     out = np.empty_like(columns)
@@ -219,10 +219,10 @@ def numba(system: System, quantity: Quantity, *, limit: int | None = SMALL) -> A
     """Return a numba function ``f(t, y, par, out)`` on arrays, cached on disk.
 
     No fastmath: no reordering, no contraction. ``y``, ``par`` and ``out`` must not
-    overlap. ``limit`` as in `source`. The field of a `Foreign` system is a plain Python
+    overlap. ``limit`` as in `source`. The field of an `Opaque` system is a plain Python
     function.
     """
-    if isinstance(system, Foreign) and quantity == "field":
+    if isinstance(system, Opaque) and quantity == "field":
         return system.evaluate
     function = _function(system, quantity)
     cost = compilable(system, function)

@@ -1,1 +1,1 @@
-"""What is integrated: Hamiltonian and Poisson systems, any first-order system, foreign code."""
+"""Dynamical systems: Hamiltonian and Poisson systems, any first-order system, opaque code."""

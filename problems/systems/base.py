@@ -1,4 +1,4 @@
-"""What all systems have in common: a traced graph, parameters, invariants, guards."""
+"""Base class of all systems: a traced graph, parameters, invariants and symmetry guards."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -28,16 +28,16 @@ _NAMED = ("field", "hamiltonian", "force", "velocity_scale")
 
 @dataclass(frozen=True)
 class Bodies:
-    """What makes a system N gravitating bodies, for engines that know bodies.
+    """Description of a system of N gravitating bodies, for N-body integrators.
 
     Attributes
     ----------
     masses : str
         Name of the vector parameter with the N masses.
     G : float or str
-        The gravitational constant, or the parameter that holds it.
+        The gravitational constant, or the name of its parameter.
     dimension : int
-        Coordinates per body; the state holds all positions body by body, then all momenta.
+        Coordinates per body; the state consists of all positions body by body, then all momenta.
 
     Examples
     --------
@@ -52,28 +52,28 @@ class Bodies:
 
 
 class System:
-    """A first-order system traced once; the base of `Hamiltonian` and `VectorField`.
+    """A first-order system; the base class of `Hamiltonian` and `VectorField`.
 
     Attributes
     ----------
     kind : {"hamiltonian", "vector_field", "poisson"}
         What the system is.
     traced : bool
-        Whether the vector field is a graph that can be emitted; see `problems.systems.untraced`.
+        Whether the vector field is a graph that can be emitted; see `problems.systems.opaque`.
     dim : int
         Length of the state.
     dof : int or None
-        Degrees of freedom; ``None`` where the state is not positions and momenta.
+        Degrees of freedom; ``None`` if the state does not consist of positions and momenta.
     name : str
-        A name for messages and generated code.
+        Name for messages and generated code.
     parameters : mapping of str to float or tuple of float
         Names and default values; the values are run-time arguments.
     bodies : Bodies or None
-        What makes it an N-body system.
+        Description of an N-body system.
     invariants : mapping of str to Function
         The conserved quantities by name, the energy first; a list of numbers is one function.
     guards : mapping of str to Function
-        Quantities that a symmetry keeps at 0.
+        Quantities that are exactly 0 by a symmetry.
 
     Examples
     --------
@@ -209,16 +209,16 @@ class System:
         *,
         data: tuple[int, ...] | None = None,
     ) -> Function:
-        """Trace a function of the same arguments, on a graph of its own: nothing of the system changes.
+        """Trace a function of the same arguments; the system is not changed.
 
         Parameters
         ----------
         function : callable
             Returns one number; its arguments are among ``t, q, p, y, par, m``.
         label : str
-            What it is, for messages.
+            Description for messages.
         outputs : int, optional
-            So many numbers, in a list, and not one.
+            Length of the returned list; by default the function returns one number.
         data : tuple of int, optional
             The shape, () or (n,), of a further argument ``data``, whose numbers come after the parameters.
 
@@ -356,13 +356,13 @@ class System:
         return stacked([gradient(node, self.dim) for node in scalar.roots], name)
 
     def together(self, *functions: Function) -> Function:
-        """Return functions as one with all their outputs: what they share is computed once."""
+        """Return one function with all outputs of several; common subexpressions are computed once."""
         if functions not in self._together:
             self._together[functions] = stacked(functions)
         return self._together[functions]
 
     def jacobian(self, function: str = "field") -> Jacobian | None:
-        """Return the Jacobian of the field, or of the force, or ``None`` where none is written down.
+        """Return the Jacobian of the field, or of the force, or ``None`` if there is no formula.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Canonical systems, from their energy written once in ordinary Python arithmetic."""
+"""Canonical Hamiltonian systems, defined by a Python function that returns the energy."""
 
 from collections.abc import Callable, Mapping
 from functools import cached_property
@@ -18,22 +18,22 @@ class Hamiltonian(System):
     Parameters
     ----------
     H : callable
-        The energy, in ordinary arithmetic; names the arguments it needs among
-        ``t, q, p, y, par, m``. It is run once, on symbols.
+        The energy, in ordinary arithmetic; its arguments are among ``t, q, p, y, par, m``. It is traced:
+        called once, with symbols.
     dof : int
         Degrees of freedom.
     parameters : mapping of str to float or sequence of float
         Names, shapes and default values of the parameters.
     invariants : mapping of str to callable
-        Quantities kept by the flow besides the energy; each a number or a list.
+        Quantities conserved besides the energy; each a number or a list.
     guards : mapping of str to callable
-        Quantities that stay exactly 0 by symmetry.
+        Quantities that are exactly 0 by symmetry.
     bodies : Bodies, optional
-        What makes it an N-body system.
+        Description of an N-body system.
     domain : callable, optional
-        A number that is positive wherever H is defined.
+        A function that is positive wherever H is defined.
     name : str, optional
-        A name for messages; the function's own by default.
+        Name for messages; that of the function by default.
 
     Examples
     --------

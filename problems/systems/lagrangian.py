@@ -1,4 +1,4 @@
-"""Mechanical systems from their Lagrangian: the momenta and the Hamiltonian are found from it."""
+"""Mechanical systems defined by a Lagrangian, from which the momenta and the Hamiltonian are derived."""
 
 from collections.abc import Callable
 from functools import cached_property
@@ -16,17 +16,17 @@ from problems.trace.source_line import line_of_function
 
 
 class Lagrangian(Hamiltonian):
-    """A mechanical system, from L = kinetic minus potential energy, of positions and velocities.
+    """A mechanical system defined by the Lagrangian L(q, v), kinetic minus potential energy.
 
     L is quadratic in the velocities, ``L = v.M(q, t) v/2 + A(q, t).v - V(q, t)``, written in any form.
-    The momenta are ``p = M v + A`` and ``H = (p - A).M^-1 (p - A)/2 + V``, with M factored
-    as L D L^T symbolically: the system is a `Hamiltonian` in q and p for every method, and M(q) q'' is
-    never solved for numerically.
+    The momenta are ``p = M v + A`` and ``H = (p - A).M^-1 (p - A)/2 + V``, where M is factored symbolically
+    as L D L^T: every method receives a `Hamiltonian` in q and p, and no linear system with M(q) is solved
+    numerically.
 
     Parameters
     ----------
     L : callable
-        Names the arguments it needs among ``t, q, v, par, m``. Velocities do not stand in `m.sum`.
+        The Lagrangian; its arguments are among ``t, q, v, par, m``. `m.sum` must not contain velocities.
     dof : int
         Degrees of freedom.
     parameters, guards, name

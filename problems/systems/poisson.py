@@ -14,14 +14,13 @@ from problems.trace.source_line import line_of_function
 
 
 class Poisson(System):
-    """A system y' = B(y) grad H(y) that keeps its energy H, and the Casimirs of B.
+    """A system y' = B(y) grad H(y), which conserves its energy H and the Casimirs of B.
 
     Parameters
     ----------
     H : callable
-        The energy; names the arguments it needs among ``y, par, m`` (``t`` too, but
-        then the energy is not conserved). Sums are Python's own: `m.sum` is for
-        canonical systems.
+        The energy; its arguments are among ``y, par, m`` (and ``t``, but then the energy is not conserved).
+        Use Python's sums: `m.sum` is for canonical systems.
     B : callable
         Returns the structure matrix, dim lists of dim entries, with
         ``B[j][i]`` written as ``-B[i][j]``; arguments as for ``H``.
@@ -30,12 +29,12 @@ class Poisson(System):
     parameters, guards, name
         As for `Hamiltonian`.
     invariants : mapping of str to callable
-        Quantities kept besides the energy, such as the Casimirs of B.
+        Quantities conserved besides the energy, such as the Casimirs of B.
 
     Raises
     ------
     problems.errors.InputError
-        If B has not the right shape or is not skew-symmetric as it is written.
+        If B does not have the right shape or is not written as a skew-symmetric matrix.
 
     Examples
     --------

@@ -14,7 +14,7 @@ _WRITTEN = {
     "Hamiltonian": ["hamiltonian"],
     "Lagrangian": ["hamiltonian", "momentum"],
     "VectorField": ["field"],
-    "Foreign": [],  # its field is code
+    "Opaque": [],  # its field is code
     "Poisson": ["hamiltonian", "field", "gradient", "structure"],
 }
 """What systems of each kind are made of."""
@@ -41,7 +41,7 @@ def check_system(state: Mapping[str, Any], classes: Iterable[str]) -> dict[str, 
         refuse("its name is no text")
     dim, dof = integer(state["dim"], 1, 2**53, "its dimension"), state["dof"]
     limits.check("a stored system", "COMPONENTS", dim)
-    kind = next((name for name in classes if name in _WRITTEN), "Foreign")
+    kind = next((name for name in classes if name in _WRITTEN), "Opaque")
     canonical = kind in ("Hamiltonian", "Lagrangian")
     if (dof is not None) != canonical or (dof is not None and 2 * integer(dof, 1, dim + 1, "dof") != dim):
         refuse(f"a {kind} has dim={dim} and dof={shown(dof)}")

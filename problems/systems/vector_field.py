@@ -1,4 +1,4 @@
-"""First-order systems, from their right-hand side written once in ordinary Python arithmetic."""
+"""First-order systems, defined by a Python function that returns the right-hand side."""
 
 from collections.abc import Callable
 from typing import Annotated, Any
@@ -16,7 +16,7 @@ class VectorField(System):
     Parameters
     ----------
     f : callable
-        Returns the list of derivatives; names the arguments it needs among ``t, y, par, m``.
+        The right-hand side; returns the list of derivatives. Its arguments are among ``t, y, par, m``.
     dim : int
         Length of the state.
     parameters, invariants, guards, name

@@ -8,7 +8,7 @@ import pytest
 from tests.costs.cases import CASES, counted, recorded
 
 NEAR = 0.02  # part of a count that functions of another processor's library may move it by
-FEW = 2  # the same of small counts: one step or two more
+SMALL_DIFFERENCE = 2  # the same of small counts: one step or two more
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -18,7 +18,7 @@ def test_an_integration_costs_what_is_on_record(name):
     for method, counts in now.items():
         for kind, count in counts.items():
             was = before[method][kind]
-            few = FEW * (1 if kind == "steps" else counts["evaluations"] // counts["steps"])
+            few = SMALL_DIFFERENCE * (1 if kind == "steps" else counts["evaluations"] // counts["steps"])
             assert abs(count - was) <= max(NEAR * was, few), f"{method}: {kind} {was} -> {count}"
 
 

@@ -1,15 +1,21 @@
 """Numbers in the pages are those of the stored results: tables are copies of a report's, prose quotes it."""
 
 import re
+import sys
 
+import jinja2
 import pytest
 
 from tests.docs import pages
 
+sys.path.insert(0, str(pages.DOCS / "_ext"))
+from stored import Stored
+
 REPORTS = pages.ROOT / "reports"
 LINK = re.compile(r"\]\((?:\.\./)*reports/(\w[\w-]*)/")
 NUMBER = re.compile(r"(?<![\w.])\d\.\d+e-?\d+")  # a measured error; bounds are round numbers
-RATIO = re.compile(r"(?<![\w.])\d+\.\d+(?= times| µs| ms|×)")
+RATIO = re.compile(r"(?<![\w.])\d+\.\d+(?= times| µs| ms|×| of the time)")
+INSERTED = re.compile(r"\{\{ stored\(.*?\) \}\}")
 
 
 def report(name: str) -> str:
@@ -24,7 +30,8 @@ def quotes() -> list[tuple[str, str, str]]:
         (str(page.relative_to(pages.ROOT)), names[0], " ".join(paragraph.split()))
         for page in pages.sources()
         for paragraph in re.split(r"\n\s*\n", page.read_text(encoding="utf-8"))
-        if len(names := list(dict.fromkeys(LINK.findall(paragraph)))) == 1 and NUMBER.search(paragraph)
+        if len(names := list(dict.fromkeys(LINK.findall(paragraph)))) == 1
+        and (NUMBER.search(paragraph) or RATIO.search(paragraph))
     ]
 
 
@@ -40,3 +47,75 @@ def test_the_first_table_is_the_reports():
 def test_what_a_paragraph_quotes_stands_in_the_report_it_links_to(page, name, text):
     numbers = {*NUMBER.findall(re.sub(r"`[^`]*`", "", text)), *RATIO.findall(text)}
     assert {one for one in numbers if one not in report(name)} == set(), page
+
+
+def insertions() -> list[tuple[str, str]]:
+    """Return what the build inserts from reports: page, expression."""
+    return [
+        (str(page.relative_to(pages.ROOT)), expression)
+        for page in pages.sources()
+        for expression in INSERTED.findall(page.read_text(encoding="utf-8"))
+    ]
+
+
+def test_pages_take_ratios_from_the_reports():
+    taking = {page for page, _ in insertions()}
+    wanted = {"docs/faq.md", "docs/general.md", "docs/ensembles.md", "docs/theory/adaptive_steps.md"}
+    assert wanted <= taking
+
+
+@pytest.mark.parametrize(("page", "expression"), insertions())
+def test_what_the_build_inserts_is_a_number_of_the_report(page, expression):
+    number = jinja2.Template(expression).render(stored=Stored())
+    assert re.fullmatch(r"\d+(\.\d+)?", number), page
+    report_of = re.search(r'stored\("(\w+)"', expression)
+    assert report_of is not None
+    if "digits" not in expression:
+        assert f"{number}×" in report(report_of.group(1))
+
+
+def test_a_page_that_inserts_numbers_enables_it():
+    for page in {page for page, _ in insertions()}:
+        head = (pages.ROOT / page).read_text(encoding="utf-8").split("---\n")[1]
+        assert "substitution" in head, page
+
+
+def test_a_cell_that_is_not_there_or_not_alone_is_an_error():
+    with pytest.raises(ValueError, match=r"^0 cells are 'HBVM\(tol=2\)'"):
+        Stored()("costs", "projection", "HBVM(tol=2)", "median")
+    with pytest.raises(ValueError, match=r"^6 cells are 'HBVM\('"):
+        Stored()("costs", "Time relative to HBVM()", "HBVM(", "median")
+    with pytest.raises(ValueError, match="no number"):
+        Stored()("costs", "projection", "HBVM(tol=1e-06, projection", "setting")
+
+
+README = " ".join((pages.ROOT / "README.md").read_text(encoding="utf-8").split())
+"""It is read on GitHub, where nothing is inserted: its ratios are compared."""
+
+WHFAST = "WHFast512 × HBVM and Gauss"
+SLOWER = "best over best of HBVM and Gauss"
+README_RATIOS = [
+    ("0.54 times the time of Gauss", [("race", "At other accuracies", "1e-08, 1e-05 | Gauss", WHFAST)]),
+    (
+        "heyoka is faster, by a factor of about 3",
+        [("general", "compilations", f"({system}) | Taylor", SLOWER) for system in ("C1", "C2", "C3", "C4")],
+    ),
+]
+
+
+@pytest.mark.parametrize(("words", "cells"), README_RATIOS, ids=["WHFast512", "linear systems"])
+def test_a_ratio_of_the_first_page_is_that_of_the_report(words, cells):
+    assert words in README
+    said = float(re.search(r"\d+\.?\d*", words).group())
+    for cell in cells:
+        value = float(Stored()(*cell))
+        if "about" in words:  # 2.6 to 3.2 measured
+            assert abs(1.0 / value - said) <= 0.5
+        else:
+            assert value == said
+
+
+def test_no_other_ratio_of_the_first_page_is_without_a_report():
+    prose = " ".join(text for text in re.split(r"(?<=[.:]) ", README) if "|" not in text)
+    ratios = re.findall(r"(?<![\w.])\d+\.\d+ times|by a factor of about \d+(?:\.\d+)?", prose)
+    assert {one for one in ratios if not any(one in words for words, _ in README_RATIOS)} == set()

@@ -11,7 +11,7 @@ import problems
 from hbvm_bench.campaign.spec import parse_spec
 from integrators import HBVM, Gauss, LineIntegral
 from integrators.protocol import Status
-from problems import Foreign, Hamiltonian, Problem, VectorField
+from problems import Hamiltonian, Opaque, Problem, VectorField
 from problems.errors import InputError
 
 from .fault import Fault, is_met, sentence
@@ -200,7 +200,7 @@ def test_a_look_at_the_ends_asks_for_two_values_of_the_field():
         asked.append(t)
         return [y[1], -y[0] - 0.9 * abs(y[0])]
 
-    problem = Problem(Foreign(field, dim=2), y0=[1.0, 0.0], t_end=20.0)
+    problem = Problem(Opaque(field, dim=2), y0=[1.0, 0.0], t_end=20.0)
     stats = integrators.integrate(problem, HBVM(k=8, s=4, tol=1e-8), [20.0]).stats
     assert stats.extra["kinks"]
     assert len(asked) - stats.evaluations in (0, 1)  # the first length takes one; 193 before
@@ -246,7 +246,7 @@ def test_who_does_not_look_for_kinks_says_so(method, why):
 @pytest.mark.parametrize("method", [Gauss(s=6, tol=1e-12), HBVM(k=7, s=4, tol=1e-12)], ids=repr)
 def test_few_nodes_on_a_field_that_is_not_traced_are_said(method):
     # A jump of it cost 1.2e-3 with Gauss(6), and nothing was said.
-    jump = Problem(Foreign(lambda t, y: [-y[0] + (1.0 if t > 1.3 else -1.0)], dim=1), y0=[1.0], t_end=5.0)
+    jump = Problem(Opaque(lambda t, y: [-y[0] + (1.0 if t > 1.3 else -1.0)], dim=1), y0=[1.0], t_end=5.0)
     (warning, *_) = integrators.integrate(jump, method, [5.0]).warnings
     sentence(warning, r"not traced, in which k=\d nodes .* give breakpoints or k >= 8")
     told = type(method)(**{**method.options(), "breakpoints": [1.3]})

@@ -106,7 +106,7 @@ class Rate:
 )
 def test_another_field_of_the_same_name_that_is_not_traced(make):
     growing, falling = (
-        problems.Problem(problems.Foreign(make(k), dim=1, name="rate"), y0=[1.0], t_end=1.0)
+        problems.Problem(problems.Opaque(make(k), dim=1, name="rate"), y0=[1.0], t_end=1.0)
         for k in (1.0, -5.0)
     )
     other = start(CASES[0].method, growing).checkpoint()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from integrators import HBVM, Gauss, integrate, integrate_many
-from problems import Foreign, Problem, VectorField
+from problems import Opaque, Problem, VectorField
 
 METHODS = [HBVM(), HBVM(k=8, s=7, tol=1e-12), Gauss(s=6, tol=1e-12)]
 END = 10.0
@@ -102,7 +102,7 @@ def test_a_jump_in_code_is_found(method, sample):
     times = np.linspace(0.0, END, 8)
     most = 1e-3 if sample == "dense" else WRONG  # of lower order
     for c in np.random.default_rng(2).uniform(0.2, 9.8, 30):
-        system = Foreign(lambda t, y, c=c: [y[1], -y[0] + math.copysign(1.0, t - c)], dim=2)
+        system = Opaque(lambda t, y, c=c: [y[1], -y[0] + math.copysign(1.0, t - c)], dim=2)
         solution = integrate(Problem(system, y0=[1.0, 0.0], t_end=END), method, times, sample=sample)
         assert not solution.status.failed
         assert np.abs(solution.y - exact(c, solution.t)).max() < most, c

@@ -343,12 +343,12 @@ Poisson(lambda y: y[0]**2, lambda y: [[0, 1], [-1, 0]], dim=10**6) | HBVM_BENCH_
 Poisson(lambda y: y[0]**2, lambda y: np.array([[0, 1], [-1, 0]]), dim=2) | B must return 2 lists of 2
 Poisson(lambda y: y[0]**2, lambda y: [[1, 1], [-1, 0]], dim=2) | B is not skew-symmetric as it is written:
 Poisson(lambda q: q[0]**2, lambda y: [[0, 1], [-1, 0]], dim=2) | H asks for an argument 'q'; name those it
-Foreign(3, dim=2)                                            | f must be a function, not 3
-Foreign(lambda t: t, dim=2)                                  | a field has the arguments (t, y), (t, y, dy),
-Foreign(lambda t, y, a, b: t, dim=2)                         | a field has the arguments (t, y), (t, y, dy),
-Foreign(lambda t, y: y, dim='a')                             | dim='a' of Foreign must be a whole number of
-Foreign(lambda t, y: y)                                      | Foreign needs dim; give a value as in
-Foreign(lambda t, y: y, dim=10**9)                           | HBVM_BENCH_MAX_COMPONENTS
+Opaque(3, dim=2)                                            | f must be a function, not 3
+Opaque(lambda t: t, dim=2)                                  | a field has the arguments (t, y), (t, y, dy),
+Opaque(lambda t, y, a, b: t, dim=2)                         | a field has the arguments (t, y), (t, y, dy),
+Opaque(lambda t, y: y, dim='a')                             | dim='a' of Opaque must be a whole number of
+Opaque(lambda t, y: y)                                      | Opaque needs dim; give a value as in
+Opaque(lambda t, y: y, dim=10**9)                           | HBVM_BENCH_MAX_COMPONENTS
 """
 
 PROBLEMS = r"""

@@ -73,7 +73,7 @@ def test_an_error_of_a_function_stays_in_its_thread(monkeypatch):
         return [y[1], -y[0]]
 
     def run(f):
-        system = problems.Foreign(f, dim=2)
+        system = problems.Opaque(f, dim=2)
         return HBVM(k=4, s=2, h=0.1).compile(system).start([1.0, 0.0]).advance([1.0])
 
     alone, inner, others = run(good), engine.raise_kept, []
@@ -93,7 +93,7 @@ def test_an_error_of_a_function_stays_in_its_thread(monkeypatch):
 
 def test_a_field_is_made_for_all_threads_once(monkeypatch):
     """Else one thread is left with the address of code that the other has thrown away."""
-    system, inner, count = problems.Foreign(lambda t, y: [y[1], -y[0]], dim=2, name="f"), foreign._called, []
+    system, inner, count = problems.Opaque(lambda t, y: [y[1], -y[0]], dim=2, name="f"), foreign._called, []
 
     def slowly(*arguments):
         count.append(1)

@@ -10,7 +10,7 @@ import numpy as np
 import integrators
 import problems
 from integrators import HBVM, Event, integrate, integrate_many, registry, section
-from problems import Bodies, Foreign, Hamiltonian, Poisson, Problem, VectorField, emit, load
+from problems import Bodies, Hamiltonian, Opaque, Poisson, Problem, VectorField, emit, load
 
 from .fault import Fault
 
@@ -55,7 +55,7 @@ def names() -> dict[str, Any]:
         "Hamiltonian": Hamiltonian,
         "VectorField": VectorField,
         "Poisson": Poisson,
-        "Foreign": Foreign,
+        "Opaque": Opaque,
         "Problem": Problem,
         "Bodies": Bodies,
         "deep": deep,
@@ -66,7 +66,7 @@ def names() -> dict[str, Any]:
         "K1": Problem(spring, y0=[1.0, 0.0], t_end=1.0),
         "P1": Problem(pendulum, q0=[0.0], p0=[1.9], t_end=1.0),
         "M1": HBVM(k=4, s=2, h=0.1),
-        "F": lambda f: Problem(Foreign(f, dim=2), y0=[1, 2], t_end=1.0),
+        "F": lambda f: Problem(Opaque(f, dim=2), y0=[1, 2], t_end=1.0),
     }
 
 

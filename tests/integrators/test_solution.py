@@ -22,7 +22,7 @@ from integrators import (
     integrate,
     load,
 )
-from problems import Foreign, Hamiltonian, InputError, Poisson, Problem, VectorField, emit
+from problems import Hamiltonian, InputError, Opaque, Poisson, Problem, VectorField, emit
 from problems.errors import MissingLibraryError
 
 METHODS = [
@@ -158,7 +158,7 @@ class TestFiles:
             assert mine.dtype == other.dtype
 
     def test_foreign_code_is_given_again(self, tmp_path):
-        problem = Problem(Foreign(_field, dim=2), y0=[1.0, 0.0], t_end=1.0)
+        problem = Problem(Opaque(_field, dim=2), y0=[1.0, 0.0], t_end=1.0)
         integrate(problem, HBVM(k=4, s=2, h=0.1)).save(tmp_path / "a.npz")
         with pytest.raises(InputError, match="load it with problem="):
             load(tmp_path / "a.npz")
@@ -211,7 +211,7 @@ class TestPickles:
                 assert emit.source(again.system, its, backend) == emit.source(problem.system, mine, backend)
 
     def test_foreign_code_by_its_name(self):
-        problem = Problem(Foreign(_field, dim=2, parameters={"a": 1.0}), y0=[1.0, 0.0], t_end=1.0)
+        problem = Problem(Opaque(_field, dim=2, parameters={"a": 1.0}), y0=[1.0, 0.0], t_end=1.0)
         again = pickle.loads(pickle.dumps(problem))
         assert again == problem
         assert again.system.f is _field

@@ -8,7 +8,7 @@ import pytest
 
 from integrators import Status, integrate, testing
 from integrators.stepping import FixedStep, FixedStepper
-from problems import Foreign, Problem, VectorField, emit
+from problems import Opaque, Problem, VectorField, emit
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -67,7 +67,7 @@ def test_what_a_foreign_field_raises_ends_the_run_with_the_time_of_its_step(comp
             raise RuntimeError("boom")
         return np.array([y[1], -y[0]])
 
-    foreign = Foreign(numba.njit(field) if compiled else field, dim=2)
+    foreign = Opaque(numba.njit(field) if compiled else field, dim=2)
     problem = Problem(foreign, y0=[1.0, 0.0], t_end=5.0)
     solution = integrate(problem, RK4(h=0.125), [0.5, 0.9, 1.0, 4.0])
     assert solution.status is Status.USER_ERROR

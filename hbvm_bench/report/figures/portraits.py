@@ -15,7 +15,7 @@ from problems.problem import Problem
 Array = NDArray[np.float64]
 
 COLUMNS = 6
-MOST = 3000  # points of one case that are drawn
+POINTS_DRAWN = 3000  # points of one case that are drawn
 PAGE_POINTS = 700  # and that the page carries
 FEWEST_CROSSINGS = 20
 FARTHEST = 3.0  # times the usual width: a wider cloud is cut at the edge of its panel
@@ -92,7 +92,7 @@ def _grid(
     for axes in grid[len(clouds) :]:
         axes.set_axis_off()
     for axes, (case, x, y) in zip(grid, clouds, strict=False):
-        every = max(1, -(-x.size // MOST))
+        every = max(1, -(-x.size // POINTS_DRAWN))
         axes.plot(x[::every], y[::every], ".", color=case.look.light, markersize=1.1, rasterized=True)
         axes.set(xlim=reach[0], ylim=reach[1])
         axes.set_title(case.short, fontsize=8, color=INK)

@@ -7,7 +7,7 @@ import numpy as np
 
 from integrators.peers import load
 from integrators.protocol import Array, MethodBase, Status
-from integrators.running.watchdog import CRAWL_STEPS, Crawl, crawl
+from integrators.running.watchdog import CRAWL_STEPS, StallDetector, stall_detector
 from integrators.stepping import FixedStepper, ProgramBase, RestorableStepper, StepperBase
 from problems.errors import InputError
 from problems.problem import System
@@ -202,7 +202,7 @@ class AdaptiveStepper(RestorableStepper):
             self._inner = None
             state, (accepted, rejected, arrived) = self._way.plain(t, end, y, self._par, *self._tolerances)
             if not arrived:  # why not is found out under a watch
-                _, y = self._watched(t, y, end, crawl(self, t, end))
+                _, y = self._watched(t, y, end, stall_detector(self, t, end))
                 if self._status.failed:
                     return grid[:i], states[:i]
                 state, accepted, rejected, self._inner = y, 0, 0, None
@@ -216,7 +216,7 @@ class AdaptiveStepper(RestorableStepper):
         if how == "end":
             return self._ends(grid)
         states, t, y = np.empty((grid.size, self._y.size)), self._t, self._y
-        watch = crawl(self, t, float(grid[-1]))
+        watch = stall_detector(self, t, float(grid[-1]))
         for i, end in enumerate(grid.tolist()):
             t, y = self._watched(t, y, end, watch)
             if self._status.failed:
@@ -224,12 +224,12 @@ class AdaptiveStepper(RestorableStepper):
             states[i] = y
         return grid, states
 
-    def _watched(self, t: float, y: Array, end: float, watch: Crawl) -> tuple[float, Array]:
+    def _watched(self, t: float, y: Array, end: float, watch: StallDetector) -> tuple[float, Array]:
         """Solve from ``t`` to ``end``, a limited number of steps at a time; note a failure."""
         code = self._program.solve.LIMIT
         while code == self._program.solve.LIMIT and t != end:
             t, y, code = self._advance(t, y, end, CRAWL_STEPS)
-            if code == self._program.solve.LIMIT and (stalled := watch.sees(t, CRAWL_STEPS)):
+            if code == self._program.solve.LIMIT and (stalled := watch.update(t, CRAWL_STEPS)):
                 self._fail(Status.STALLED, t, stalled)
             if self._status.failed:
                 return t, y

@@ -12,7 +12,7 @@ from integrators.peers import load
 from integrators.protocol import Array, Status, Trajectories
 from integrators.refusals import check_batch, check_times
 from integrators.running.times import Counts
-from integrators.running.watchdog import CRAWL_STEPS, Crawl
+from integrators.running.watchdog import CRAWL_STEPS, StallDetector
 from problems import emit
 from problems.systems.base import System
 
@@ -127,7 +127,7 @@ class Lanes:
         as soon as one lane is not finite, wherever the others are then, so these are propagated again.
         """
         ta = self._ta
-        watches = {lane: Crawl(float(before[lane]), time) for lane in going}
+        watches = {lane: StallDetector(float(before[lane]), time) for lane in going}
         ahead = set(going)
         while True:
             for lane in sorted(ahead):
@@ -139,7 +139,7 @@ class Lanes:
                 elif t == time:
                     ahead.discard(lane)
                     continue
-                elif reason := watches[lane].sees(t, steps):
+                elif reason := watches[lane].update(t, steps):
                     status = Status.STALLED
                 else:
                     continue

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from integrators.events.event import Event
-from integrators.events.finder import Hits
+from integrators.events.finder import EventLog
 from integrators.peers import load
 from integrators.protocol import Array
 from problems import emit
@@ -67,7 +67,7 @@ class TaylorSearch:
 
     def __init__(self, events: Mapping[str, Event], y: Array, t: float, end: float, present: Any):
         self._events, self._start, self._end, self._present = list(events.values()), t, end, present
-        self._hits = Hits(events, 1.0 if end >= t else -1.0, y.size)
+        self._hits = EventLog(events, 1.0 if end >= t else -1.0, y.size)
         self._ahead: list[tuple[float, Array, int, int]] = []
         self._counts = [0] * len(events)
         self._finished = False
@@ -106,7 +106,7 @@ class TaylorSearch:
         self._finished = True
 
     @property
-    def hits(self) -> Hits:
+    def hits(self) -> EventLog:
         """What has happened up to the present."""
         now, self._ahead = self._ahead, []
         if not (self._finished or self.over):

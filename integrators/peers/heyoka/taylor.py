@@ -19,7 +19,7 @@ from integrators.peers import UNTRACED, load
 from integrators.peers.heyoka.batch import Lanes
 from integrators.peers.heyoka.events import TaylorSearch, heyoka_events
 from integrators.protocol import Array, MethodBase, Status, Trajectories
-from integrators.running.watchdog import CRAWL_STEPS, crawl
+from integrators.running.watchdog import CRAWL_STEPS, stall_detector
 from integrators.stepping import ProgramBase, RestorableStepper
 from problems.problem import Problem, System
 
@@ -345,7 +345,7 @@ class TaylorStepper(RestorableStepper):
 
     def _step_to(self, t: float, *, write_tc: bool = False) -> bool:
         """Go to ``t`` by a shortened last step; return whether that succeeded."""
-        watch = crawl(self, self._ta.time, t)
+        watch = stall_detector(self, self._ta.time, t)
         few = self.search is not None and self.search.terminates
         most = STEPS_BEYOND if few else CRAWL_STEPS
         while True:
@@ -358,7 +358,7 @@ class TaylorStepper(RestorableStepper):
                 return True
             if outcome == self._outcome.err_nf_state:
                 self._broken(self._ta.time if np.isfinite(self._ta.time) else before)
-            elif stalled := watch.sees(self._ta.time, steps):
+            elif stalled := watch.update(self._ta.time, steps):
                 self._fail(Status.STALLED, self._ta.time, stalled)
             if self._status is not Status.RUNNING:
                 return False

@@ -12,7 +12,7 @@ import numpy as np
 
 from integrators.peers import load
 from integrators.protocol import Array, MethodBase, Status, UserError
-from integrators.running.watchdog import Crawl, crawl
+from integrators.running.watchdog import StallDetector, stall_detector
 from integrators.stepping import ProgramBase, RestorableStepper, StepperBase
 from problems.problem import System
 
@@ -154,7 +154,7 @@ class SciPyStepper(StepperBase):
     def _serve(self, grid: Array, how: str) -> tuple[Array, Array]:
         sign = self._towards(float(grid[-1]))
         states = np.empty((grid.size, self._y.size))
-        watch = crawl(self, self._solver.t, float(grid[-1]))
+        watch = stall_detector(self, self._solver.t, float(grid[-1]))
         for i, t in enumerate(grid.tolist()):
             self._bound(t if how == "stop" else sign * math.inf)
             while sign * (self._solver.t - t) < 0.0:
@@ -174,7 +174,7 @@ class SciPyStepper(StepperBase):
     def _step_states(self, end: float) -> tuple[Array, Array]:
         sign = self._towards(end)
         self._bound(sign * math.inf)
-        watch = crawl(self, self._solver.t, end)
+        watch = stall_detector(self, self._solver.t, end)
         times, states = [self._t], [self._y]
         while self._solver.t != times[-1] or self._step(watch):
             if sign * (self._solver.t - end) > 0.0:
@@ -186,7 +186,7 @@ class SciPyStepper(StepperBase):
     @QUIET()
     def _one_step(self) -> tuple[float, Array] | None:
         self._bound(self._solver.direction * math.inf)
-        if self._solver.t == self._t and not self._step(Crawl(self._t, self._t)):
+        if self._solver.t == self._t and not self._step(StallDetector(self._t, self._t)):
             return None
         return float(self._solver.t), self._solver.y
 
@@ -197,7 +197,7 @@ class SciPyStepper(StepperBase):
             self._solver = self._begin(self._t, self._y, sign)
         return sign
 
-    def _step(self, watch: "Crawl") -> bool:
+    def _step(self, watch: "StallDetector") -> bool:
         """Take one step; return whether it succeeded."""
         solver, stats = self._solver, self._stats
         before, jacobians, factored = float(solver.t), solver.njev, solver.nlu
@@ -212,7 +212,7 @@ class SciPyStepper(StepperBase):
             self._fail(Status.STEP_UNDERFLOW, before, f"SciPy gave up at t = {before!r}: {message}")
             return False
         stats.steps += 1
-        stalled = watch.sees(float(solver.t))
+        stalled = watch.update(float(solver.t))
         if stalled:
             self._fail(Status.STALLED, float(solver.t), stalled)
         return not stalled

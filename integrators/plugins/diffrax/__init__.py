@@ -10,7 +10,7 @@
         saveat=diffrax.SaveAt(steps=True),
     )
 
-Everything that diffrax does with a solver works: jit, vmap, any PyTree as a state,
+All features of diffrax are supported: jit, vmap, any PyTree as a state,
 dense output, step size controllers, events, all of its adjoints. A term of a traced
 system is ``diffrax.ODETerm(problems.emit.jax(system, "field"))`` with ``args=par``.
 """
@@ -174,11 +174,12 @@ def _count(name: str) -> Any:
 class HBVM(_LineIntegral):
     """HBVM(k, s), which conserves the energy, as a solver of diffrax.
 
-    Not that of a Poisson system y' = B(y) grad H(y) whose B varies: a term does not tell B.
+    It does not conserve the energy of a Poisson system y' = B(y) grad H(y) with variable B, because a term
+    does not contain B.
 
-    Equations and properties: see `integrators.HBVM`. The step is that of
-    `diffrax.diffeqsolve`, constant or chosen by a controller; the energy is conserved
-    for any sequence of steps. The error estimate is ``h |gamma_s|^2 / |gamma_0|``.
+    Equations and properties: see `integrators.HBVM`. The step size is that of `diffrax.diffeqsolve`, constant
+    or chosen by a controller; the energy is conserved for any sequence of step sizes. The error estimate is
+    ``h |gamma_s|^2 / |gamma_0|``.
 
     Parameters
     ----------
@@ -190,8 +191,8 @@ class HBVM(_LineIntegral):
     root_find_max_steps : int
         Iterations after which a step counts as failed.
     linear_solver : lineax.AbstractLinearSolver, optional
-        For derivatives: they come from the implicit function theorem, at the
-        cost of one linear solve a step. Default: LU up to 48 unknowns
+        For derivatives, which are computed by the implicit function theorem, at the cost of one linear solve
+        per step. Default: LU up to 48 unknowns
         (s times the size of the state), GMRES beyond.
 
     Raises
@@ -214,8 +215,8 @@ class HBVM(_LineIntegral):
 class Gauss(_LineIntegral):
     """Gauss(s), the symplectic collocation method of order 2s, as a solver of diffrax.
 
-    The same as ``HBVM(k=s, s=s)``. With changing steps it loses the advantage of
-    being symplectic; HBVM does not.
+    Identical to ``HBVM(k=s, s=s)``. With a variable step size it loses the long-time behaviour of a
+    symplectic method; HBVM still conserves the energy.
 
     Parameters
     ----------

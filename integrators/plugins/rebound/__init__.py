@@ -86,24 +86,24 @@ _tables: dict[tuple[int, int], Any] = {}
 
 
 def install(simulation: Any, method: HBVM | Gauss) -> None:
-    """Make ``method`` the integrator of a simulation, and its h, where it has one, the timestep.
+    """Set ``method`` as the integrator of a simulation, and its h, if given, as the timestep.
 
-    With ``tol``, as in ``HBVM(k=10, s=8, tol=1e-12)``, steps vary: for close encounters. A symplectic
-    method, such as Gauss, then loses its long-time behaviour, one with k > s conserves the energy.
+    With ``tol``, as in ``HBVM(k=10, s=8, tol=1e-12)``, the step size is adaptive, for close encounters. A
+    symplectic method, such as Gauss, then loses its long-time behaviour; one with k > s conserves the energy.
 
     Parameters
     ----------
     simulation : rebound.Simulation
         The simulation.
     method : HBVM or Gauss
-        As for `integrators.integrate`, with k and s. Without h and tol, ``HBVM(k=8, s=8)``, the
-        timestep remains ``simulation.dt``; with tol, h is the first step.
+        As for `integrators.integrate`, with k and s. Without h and tol, as in ``HBVM(k=8, s=8)``, the
+        timestep remains ``simulation.dt``; with tol, h is the initial step size.
 
     Raises
     ------
     problems.errors.InputError
-        If it is another method, or one with options that are not to be had here: those of the steps
-        but ``h`` and ``tol``, or a ``solver``, since the equations are solved by fixed-point iteration.
+        For another method, or one with unsupported options: those of the step size except ``h`` and ``tol``,
+        or a ``solver``, since the equations are solved by fixed-point iteration.
     """
     if isinstance(method, Gauss):
         method = method.as_hbvm()

@@ -5,9 +5,9 @@
 
     solution = solve_ivp(fun, (0.0, 100.0), y0, method=HBVM, k=12, s=6, rtol=1e-8, atol=1e-8)
 
-SciPy's tolerances choose the steps; the energy of a Hamiltonian system is kept to
-round-off whatever the steps are. Where ``fun`` is compiled, a numba function or the `field`
-of a problem, the steps are the kernel's.
+The step sizes follow from SciPy's tolerances; the energy of a Hamiltonian system is conserved to round-off
+for any step sizes. If ``fun`` is compiled, a numba function or the `field` of a problem, the kernel of
+`integrators.HBVM` takes the steps.
 """
 
 import warnings
@@ -53,40 +53,39 @@ class HBVM(OdeSolver):
     Parameters
     ----------
     fun : callable
-        ``fun(t, y)``. Where it is compiled, the kernel of `integrators.HBVM` takes the steps: a
-        numba function ``fun(t, y)`` or ``fun(t, y, dy)``, which puts the derivative into
-        ``dy``; or the `field` of a problem or system.
+        ``fun(t, y)``. If it is compiled, the kernel of `integrators.HBVM` takes the steps: a numba function
+        ``fun(t, y)`` or ``fun(t, y, dy)``, which writes the derivative to ``dy``; or the `field` of a problem
+        or system.
     t0, y0, t_bound, first_step, max_step, rtol, atol, jac, jac_sparsity
         As for `scipy.integrate.Radau`. The local error of a step is kept below
         ``atol + rtol * abs(y)``; by the kernel below ``max(rtol * size, atol)`` for each block of the
-        state (the momenta of one body, else each component). The stage equations are solved
-        to round-off whatever the tolerances: by fixed-point iteration, or by simplified
-        Newton where that does not contract; only then ``jac`` is needed. The kernel makes
-        Jacobians of its own.
+        state (the momenta of one body, else each component). The stage equations are solved to round-off for
+        any tolerances: by fixed-point iteration, or by simplified Newton iteration if that does not converge;
+        only then ``jac`` is needed. The kernel computes its own Jacobians.
     vectorized : bool
-        Whether ``fun`` takes y of shape (n, m). All stages are then evaluated in
-        one call, provided that ``fun`` also takes the m times as an array, which
-        is tried out once.
+        Whether ``fun`` takes y of shape (n, m). All stages are then evaluated in one call, if ``fun`` also
+        takes the m times as an array, which is tested once.
     k : int, optional
-        Nodes of the quadrature, k >= s. By default as many as it takes to see the energy to
-        round-off: 2s to begin with, or, for compiled fields, 16 or more and steps short enough.
+        Nodes of the quadrature, k >= s. Default: as many as energy conservation to round-off needs: 2s
+        initially, or, for compiled fields, 16 or more with sufficiently short steps.
     s : int
         Degree of the polynomial; the order is 2s.
     h : float, optional
-        Length of all steps but the last, > 0, whatever the tolerances; k is then to be given.
+        Fixed step size, > 0, of all steps except the last, independent of the tolerances; k must then be
+        given.
     every : int
-        How many steps of the kernel SciPy sees as one, for compiled fields: SciPy's loop costs more
-        than such a step does. States between them are still to be had by ``t_eval`` and
-        ``dense_output``, but an event that happens and is undone again within one is missed.
+        Number of steps of the kernel that are one step of SciPy, for compiled fields: SciPy's loop costs more
+        than a step of the kernel. ``t_eval`` and ``dense_output`` still give states between them, but two
+        sign changes of an event function within one such step are missed.
     interpolant : {"step", "polynomial"}
-        How states between the steps (``t_eval``, ``dense_output``, ``events``) are made: by
-        a partial step from the step's start, which keeps order 2s and energy, or
-        by the step's polynomial, which is free but of order s + 1 (functions in Python only).
+        How states between the steps (``t_eval``, ``dense_output``, ``events``) are computed: by a partial
+        step from the start of the step, of order 2s, which conserves the energy, or by the step's polynomial,
+        which costs nothing but has order s + 1 (functions in Python only).
 
     Attributes
     ----------
     nfev : int
-        States at which ``fun`` was evaluated, also where one call evaluates several.
+        Number of states at which ``fun`` was evaluated; one call may evaluate several.
     """
 
     nfev, njev, nlu = map(_counter, ("nfev", "njev", "nlu"))
@@ -201,10 +200,10 @@ class HBVM(OdeSolver):
 class Gauss(HBVM):
     """Gauss(s), collocation at the Gauss nodes, which is HBVM(s, s): ``solve_ivp(..., method=Gauss)``.
 
-    Symplectic with constant steps, ``h=...``; with adaptive ones it conserves the energy no
-    better than other methods of its order. Its s nodes do not show gamma_s, by which HBVM's steps are
-    judged: gamma_{s-1} takes its place, so that steps are shorter than HBVM's, by far where s < 4, for a
-    Python function as in the kernel. Parameters as for `HBVM`, without k.
+    Symplectic with a fixed step size, ``h=...``; with an adaptive one it conserves the energy no better than
+    other methods of its order. Its s nodes do not determine gamma_s, from which HBVM estimates the error;
+    gamma_{s-1} is used in its place. The steps are therefore shorter than those of HBVM, much shorter for s <
+    4, for a Python function as in the kernel. Parameters as for `HBVM`, without k.
     """
 
     def __init__(self, fun: Any, t0: float, y0: Any, t_bound: float, *, s: int = 6, **options: Any) -> None:

@@ -12,7 +12,7 @@ from problems import emit
 from problems.errors import InputError
 from problems.problem import Problem
 from problems.systems.base import System, Value
-from problems.systems.untraced import Foreign
+from problems.systems.opaque import Opaque
 
 Array = NDArray[np.float64]
 
@@ -107,5 +107,5 @@ def recognised(fun: Any, dim: int, *, vectorized: bool) -> Field | None:
 
 @lru_cache(maxsize=32)
 def _of_numba(fun: Any, dim: int) -> Field | None:
-    system = Foreign(fun, dim=dim)
+    system = Opaque(fun, dim=dim)
     return None if system.takes_parameters else field(system)

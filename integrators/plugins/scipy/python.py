@@ -1,6 +1,6 @@
 """Steps in Python for a function in Python: length, solver and number of nodes are found as they go.
 
-The kernel can call such a function back (`problems.systems.untraced.Foreign`), and these steps stay apart
+The kernel can call such a function back (`problems.systems.opaque.Opaque`), and these steps stay apart
 from it because that was measured. For the same call the kernel takes 1.3 to 2.5 times as long on ten
 periods of Kepler's orbit (with the leanest callback that can be written, two thirds), 4 to 6 times on a
 short integration, since each new function makes a new program, 2 to 3 times for 1,000 components, whose
@@ -182,8 +182,8 @@ class PythonSteps:
         size, slope = norm(y / scale), norm(f / scale)
         h = min(0.01 * size / slope if min(size, slope) >= 1e-5 else 1e-6, span)
         signed = h * solver.direction
-        bend = norm((solver.fun(t + signed, y + signed * f) - f) / scale) / h
-        fastest = max(slope, bend)
+        second_derivative = norm((solver.fun(t + signed, y + signed * f) - f) / scale) / h
+        fastest = max(slope, second_derivative)
         wanted = (0.01 / fastest) ** (1.0 / (2 * self._s + 1)) if fastest > 1e-15 else max(1e-6, 1e-3 * h)
         self._length = min(100.0 * h, wanted, span, solver.max_step)
         return self._length

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from scipy.optimize import brentq
 
-from problems import Foreign, VectorField
+from problems import Opaque, VectorField
 
 from .general import _forward
 from .references import dry_friction, exact, forced_oscillator
@@ -117,7 +117,7 @@ def _of_friction(rng, t0, t_end):
 
 
 def _foreign(name, f, dim, parameters, member, reference):
-    system = Foreign(f, dim=dim, parameters=parameters, name=name)
+    system = Opaque(f, dim=dim, parameters=parameters, name=name)
     return Shape(GROUP, name, system, _forward(5.0, 12.0), member, reference, 8)
 
 

@@ -6,7 +6,7 @@ from .pulsed import NARROW, STAIRCASE
 from .table import SHAPES, search, table
 from .ways import FAILED, SILENT
 
-FEW = {
+CASES = {
     "henon_heiles": 1, "duffing": 1, "kepler": 1, "driven": 1, "pole": 1, "contact": 2, "graze": 2,
     "gauss, at rest": 2, "power 21": 2, "t > par.c": 4, "t^2 > c": 2, "turning": 3,
     "dry friction": 2,
@@ -21,7 +21,7 @@ def report(found):
 
 
 def test_a_few_systems_of_every_class_are_right_or_warn():
-    found = search(shape.case(index) for shape in SHAPES for index in range(FEW.get(shape.name, 0)))
+    found = search(shape.case(index) for shape in SHAPES for index in range(CASES.get(shape.name, 0)))
     assert not any(one.verdict in (SILENT, FAILED) for one in found), report(found)
 
 

@@ -34,7 +34,7 @@ def number():
     return 3
 
 def called():
-    return problems.Problem(problems.Foreign(lambda t, y: -y, dim=1), y0=[1.0], t_end=1.0)
+    return problems.Problem(problems.Opaque(lambda t, y: -y, dim=1), y0=[1.0], t_end=1.0)
 
 def fails(n=0):
     return 1/n

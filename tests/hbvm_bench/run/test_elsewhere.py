@@ -65,7 +65,7 @@ def test_a_case_has_a_process_that_begins_with_nothing_and_its_limits_hold(tmp_p
 def test_memory_of_descendants_counts_and_they_are_killed():
     eat = "x = bytearray(300 << 20); import time; time.sleep(20)"
     start = f"import subprocess, sys; subprocess.run([sys.executable, '-c', {eat!r}])"
-    child = supervise.Fresh([sys.executable, "-c", start], {})
+    child = supervise.Subprocess([sys.executable, "-c", start], {})
     while not (descendants := psutil.Process(child.pid).children()):
         time.sleep(0.02)
     ended = supervise.watch(child, Limits(wall_seconds=15, memory_gib=0.2))

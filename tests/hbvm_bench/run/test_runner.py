@@ -123,7 +123,7 @@ def test_memory_of_processes_that_it_starts_counts_too():
     eat = "x = bytearray(300 << 20); import time; time.sleep(20)"
     start = f"import subprocess, sys; subprocess.run([sys.executable, '-c', {eat!r}])"
     ended = supervise.watch(
-        supervise.Fresh([sys.executable, "-c", start], {}), Limits(wall_seconds=15, memory_gib=0.2)
+        supervise.Subprocess([sys.executable, "-c", start], {}), Limits(wall_seconds=15, memory_gib=0.2)
     )
     assert ended.cause == "memory"
     assert 0.2 < ended.peak_gib < 0.6  # measured 0.21 to 0.31
@@ -133,7 +133,9 @@ def test_memory_of_processes_that_it_starts_counts_too():
 def test_all_processes_are_walked_over_once_in_a_second_only(monkeypatch):
     walks = []
     monkeypatch.setattr(memory.psutil, "process_iter", lambda: walks.append(time.monotonic()) or [])
-    supervise.watch(supervise.Fresh([sys.executable, "-c", "import time; time.sleep(1.6)"], {}), GENEROUS)
+    supervise.watch(
+        supervise.Subprocess([sys.executable, "-c", "import time; time.sleep(1.6)"], {}), GENEROUS
+    )
     assert len(walks) == 1  # one at every poll would be more than ten
 
 
@@ -315,7 +317,7 @@ def test_a_case_has_the_same_numbers_in_a_fork_as_in_a_process_that_begins_with_
 ):
     forks = [run(store, method) for _ in range(2)]  # of the libraries alone, and of a case
     series = store.series(forks[0].id)
-    monkeypatch.setattr(warm, "nest", lambda environment: (_ for _ in ()).throw(OSError))
+    monkeypatch.setattr(warm, "fork_server", lambda environment: (_ for _ in ()).throw(OSError))
     fresh = run(store, method)
     assert [numbers(one) for one in forks] == 2 * [numbers(fresh)]
     assert fresh.result.compile is not None
@@ -347,8 +349,8 @@ def test_a_process_with_threads_or_children_is_not_forked_from(toys, store):
 
 def test_a_nest_whose_process_was_killed_is_replaced(toys, store):
     assert run(store, "Steady(h=0.3)").result.outcome == "ok"
-    for nest in warm._idle:
-        os.kill(nest.process.pid, signal.SIGKILL)
+    for server in warm._idle:
+        os.kill(server.process.pid, signal.SIGKILL)
     assert run(store, "Steady(h=0.4)").result.outcome == "ok"
     assert run(store, "Steady(h=0.5)").result.outcome == "ok"
 
@@ -371,13 +373,13 @@ def stopped_meanwhile(store, method, limits, act):
     """Run a case, stop its warm process as soon as it has started it, do ``act`` and return the record."""
     warm.close()
     before = set(psutil.Process().children())
-    nests = []
+    servers = []
 
     def stop_at_once(asked):
         until_answered(asked)
-        if not nests:
-            nests.extend(set(psutil.Process().children()) - before)
-            nests[0].suspend()
+        if not servers:
+            servers.extend(set(psutil.Process().children()) - before)
+            servers[0].suspend()
 
     until_answered = warm._until_answered
     with pytest.MonkeyPatch.context() as patch, concurrent.futures.ThreadPoolExecutor(1) as pool:
@@ -385,13 +387,13 @@ def stopped_meanwhile(store, method, limits, act):
         future = pool.submit(run_case, case(method), str(store.directory), limits)
         while not supervise._children:
             time.sleep(0.01)
-        (nest,) = nests
+        (server,) = servers
         act()
         try:
             return future.result(timeout=30)
         finally:
             warm.close()
-            assert not nest.is_running()
+            assert not server.is_running()
 
 
 def test_the_limit_of_a_case_holds_though_its_warm_process_is_stopped(toys, store, monkeypatch):
@@ -419,8 +421,8 @@ def test_a_stopped_warm_process_is_replaced_and_no_thread_waits_for_it_after_ctr
     monkeypatch.setattr(warm, "GRACE", 0.5)
     warm.close()
     assert run(store, "Steady(h=0.3)").result.outcome == "ok"
-    (nest,) = warm._idle
-    process = psutil.Process(nest.process.pid)
+    (server,) = warm._idle
+    process = psutil.Process(server.process.pid)
     for one in (process, *process.children()):
         one.suspend()
     start = time.monotonic()

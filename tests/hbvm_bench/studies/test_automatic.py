@@ -49,17 +49,17 @@ def test_both_sides_are_measured_on_the_same_trajectory_and_a_rerun_does_nothing
     assert main(["automatic", "henon_heiles", "--rounds", "2", "--out", "kept"]) == 0
     store = Store(tmp_path / "runs" / "automatic")
     (run,) = gather([store]).runs
-    (duel,) = automatic.duels(run)
-    for side in (duel.ours, duel.theirs):
+    (pair,) = automatic.head_to_heads(run)
+    for side in (pair.ours, pair.theirs):
         metrics = side.result.metrics
         assert 0.0 < metrics["energy_max"].value < 1e-12  # measured 1e-14 to 5e-14
         assert 0.0 < metrics["position_mean"].value < 1e-9  # measured 2e-12 to 7e-12
         assert [len(one.samples) for one in side.timing.rounds] == [1, 1]
         (repeats,) = {one.repeats for one in side.timing.rounds}
         assert repeats * side.timing.summary["min"] > 0.01  # 0.02 asked for; a busy first run gives fewer
-    assert duel.ours.result.counters.steps < duel.theirs.result.counters.steps / 3
-    assert duel.ratio.low <= duel.ratio.median <= duel.ratio.high
-    assert (duel.words == "reached") == (duel.ratio.median >= duel.verdict.goal.ratio)
+    assert pair.ours.result.counters.steps < pair.theirs.result.counters.steps / 3
+    assert pair.ratio.low <= pair.ratio.median <= pair.ratio.high
+    assert (pair.words == "reached") == (pair.ratio.median >= pair.verdict.goal.ratio)
     capsys.readouterr()
     assert main(["automatic", "henon_heiles", "--rounds", "2", "--out", "kept"]) == 0
     said = capsys.readouterr().err
@@ -77,15 +77,15 @@ def test_other_problems_and_too_few_rounds_are_refused(capsys):
 
 
 def test_a_side_that_is_less_accurate_is_told():
-    ahead, behind = (automatic.duels(made({}, 3.0, worse=worse))[0] for worse in (1.0, 3.0))
+    ahead, behind = (automatic.head_to_heads(made({}, 3.0, worse=worse))[0] for worse in (1.0, 3.0))
     assert (ahead.words, behind.words) == ("reached", "less accurate")
     assert behind.ratio.median == 3.0
 
 
 def test_a_problem_without_a_goal_is_shown_with_its_ratio():
     run = made({"llvm_processor": "x"}, 3.0, problem="pendulum")
-    (duel,) = automatic.duels(run)
-    assert (duel.goal, duel.words) == ("–", "")
+    (pair,) = automatic.head_to_heads(run)
+    assert (pair.goal, pair.words) == ("–", "")
     assert automatic.ratios({"x": [run]}).rows[0][2:] == ("–", "3.00×")
 
 
@@ -94,9 +94,9 @@ def test_a_side_on_another_trajectory_has_no_ratio():
     theirs, ours = run.records
     result = msgspec.structs.replace(theirs.result, violation="another trajectory")
     lost = msgspec.structs.replace(theirs, result=result, timing=Timing(machine={}, why="lost"))
-    (duel,) = automatic.duels(msgspec.structs.replace(run, records=[lost, ours]))
-    assert duel.ratio is None
-    assert duel.words == "not compared"
+    (pair,) = automatic.head_to_heads(msgspec.structs.replace(run, records=[lost, ours]))
+    assert pair.ratio is None
+    assert pair.words == "not compared"
 
 
 @pytest.mark.slow

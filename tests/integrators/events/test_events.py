@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import integrators
 from integrators import HBVM, Event, Gauss, LineIntegral, integrate
 from integrators.protocol import Status
-from problems import Foreign, Hamiltonian, InputError, Problem, VectorField
+from problems import Hamiltonian, InputError, Opaque, Problem, VectorField
 
 OSCILLATOR = Hamiltonian(
     lambda q, p: (q[0] * q[0] + p[0] * p[0]) / 2, dof=1, parameters={"level": 0.5}, name="oscillator"
@@ -206,7 +206,7 @@ def test_a_last_part_of_a_step_that_cannot_be_solved_is_no_silence(sample, statu
     def field(t, y):  # not a number where only the partial step asks for it
         return [y[1], math.nan if 9.73 < t < 9.74 else -y[0]]
 
-    problem = Problem(Foreign(field, dim=2), y0=[0.0, 1.0], t_end=9.8)
+    problem = Problem(Opaque(field, dim=2), y0=[0.0, 1.0], t_end=9.8)
     made = integrate(problem, Gauss(s=2, h=0.5), [9.8], sample, events=Event(lambda y: y[0], name="y"))
     assert made.status is status
     assert made.reason == f"{reason} Events are known up to t = 9.5 only."

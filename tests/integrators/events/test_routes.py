@@ -11,7 +11,7 @@ import integrators
 import problems
 from integrators import HBVM, Event, Gauss, LineIntegral, integrate, integrate_many, section
 from integrators.protocol import Status
-from problems import Foreign, InputError, Problem
+from problems import InputError, Opaque, Problem
 
 METHODS = [
     HBVM(k=6, s=4, h=0.5),
@@ -245,6 +245,6 @@ def test_ctrl_c_is_heard(g):
 
 
 def test_fields_that_are_not_formulas():
-    turn = Problem(Foreign(lambda t, y: [y[1], -y[0]], dim=2), y0=[0.0, 1.0], t_end=10.0)
+    turn = Problem(Opaque(lambda t, y: [y[1], -y[0]], dim=2), y0=[0.0, 1.0], t_end=10.0)
     made = integrate(turn, Gauss(s=8, h=0.5), [10.0], events=Event(lambda y: y[0], name="y"))
     assert np.allclose(made.events["y"].t, np.pi * np.arange(1, 4), rtol=0, atol=1e-12)

@@ -19,7 +19,7 @@ from integrators import (
     start,
     testing,
 )
-from problems import Foreign, InputError, Problem, VectorField
+from problems import InputError, Opaque, Problem, VectorField
 from problems.catalogue import kepler
 
 DIGITS = 50
@@ -258,7 +258,7 @@ def ours(**options):
         (lambda: integrate(KEPLER, ours(h=0.1), start=[1.0]), "4 finite numbers"),
         (lambda: integrate(KEPLER, ours(h=0.1), start=np.full((4, 2), np.nan)), "4 finite numbers"),
         (
-            lambda: integrate(Problem(Foreign(lambda t, y: -y, dim=1), y0=[1.0], t_end=1.0), ours(h=0.1)),
+            lambda: integrate(Problem(Opaque(lambda t, y: -y, dim=1), y0=[1.0], t_end=1.0), ours(h=0.1)),
             "its field is code; leave out precision=",
         ),
         (

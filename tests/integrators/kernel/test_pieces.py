@@ -7,7 +7,7 @@ import pytest
 import problems
 from integrators import HBVM, Gauss, LineIntegral
 from integrators.protocol import Status
-from problems import Foreign, Problem
+from problems import Opaque, Problem
 
 OPTIONS = {"stiff_chain": {"omega": 1e3}}
 
@@ -18,7 +18,7 @@ def robertson(t, y, dy):
     dy[1] = -dy[0] - dy[2]
 
 
-ROBERTSON = Problem(Foreign(numba.njit(robertson), dim=3), y0=[1.0, 0.0, 0.0], t_end=100.0, name="robertson")
+ROBERTSON = Problem(Opaque(numba.njit(robertson), dim=3), y0=[1.0, 0.0, 0.0], t_end=100.0, name="robertson")
 CASES = [
     ("stiff_chain", HBVM(k=8, s=4, h=0.02, solver="newton")),
     ("stiff_chain", HBVM(k=8, s=4, h=0.02)),  # Newton takes over on the way

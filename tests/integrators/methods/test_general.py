@@ -17,7 +17,7 @@ import problems
 from integrators import HBVM, Gauss, integrate
 from integrators.kernel.varying import AdaptiveStepper
 from integrators.protocol import Status
-from problems import Foreign, Hamiltonian, Problem, VectorField
+from problems import Hamiltonian, Opaque, Problem, VectorField
 
 VAN_DER_POL = Problem(
     VectorField(
@@ -211,7 +211,7 @@ def test_a_driven_pendulum_is_one_whatever_way_it_is_written():
         lambda q, p, t, m: p[0] ** 2 / 2 - m.cos(q[0]) - 0.9 * q[0] * m.cos(2 * t / 3), dof=1, name="driven"
     )
     field = VectorField(lambda t, y, m: [y[1], -m.sin(y[0]) + 0.9 * m.cos(2 * t / 3)], dim=2, name="field")
-    systems = [driven, field, Foreign(compiled, dim=2), Foreign(force, dim=2)]
+    systems = [driven, field, Opaque(compiled, dim=2), Opaque(force, dim=2)]
     ends = {}
     for system in systems:
         problem = Problem(system, y0=[0.2, 0.0], t_end=20.0)

@@ -89,7 +89,7 @@ def test_work_is_counted_with_the_finite_differences_of_the_jacobian():
     """A system that is not traced has no Jacobian but SciPy's."""
     stats = integrate(testing.pendulum(), Radau(rtol=1e-6, atol=1e-8), [20.0]).stats
     assert stats.extra["jacobians"] >= 1
-    foreign = problems.Foreign(numba.njit(lambda t, y: np.array([y[1], -np.sin(y[0])])), dim=2)
+    foreign = problems.Opaque(numba.njit(lambda t, y: np.array([y[1], -np.sin(y[0])])), dim=2)
     problem = Problem(foreign, y0=[0.0, 1.9], t_end=20.0)
     more = integrate(problem, Radau(rtol=1e-6, atol=1e-8), [20.0]).stats
     assert more.evaluations > stats.evaluations

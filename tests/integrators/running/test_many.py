@@ -8,7 +8,7 @@ import pytest
 
 import problems
 from integrators import HBVM, Gauss, Status, integrate, integrate_many, registry
-from problems import Foreign, Hamiltonian, Problem
+from problems import Hamiltonian, Opaque, Problem
 
 rng = np.random.default_rng(3)
 
@@ -96,7 +96,7 @@ def test_a_field_of_foreign_code_goes_one_by_one_and_its_errors_are_told():
             raise ValueError("too far")
         return [y[1], 0.0]
 
-    problem = Problem(Foreign(f, dim=2), y0=[0.0, 0.1], t_end=3.0)
+    problem = Problem(Opaque(f, dim=2), y0=[0.0, 0.1], t_end=3.0)
     made = integrate_many(problem, HBVM(k=4, s=2, h=0.1), starts=[[0.0, 0.1], [0.0, 1.0], [3.0, 0.0]])
     assert made.status[0] is Status.FINISHED
     for i, reached in ((1, "t = 2.0"), (2, "t = 0.0")):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import problems
-from problems import Foreign, Hamiltonian, InputError, VectorField, emit
+from problems import Hamiltonian, InputError, Opaque, VectorField, emit
 from problems.analysis.invariants import evaluate
 
 SMALL = 2.0**-20
@@ -103,9 +103,7 @@ def test_asking_for_an_energy_differentiates_nothing():
 
 
 def test_the_field_of_code_is_none():
-    system = Foreign(
-        lambda t, y: [y[1], -y[0]], dim=2, invariants={"radius": lambda y: y[0] ** 2 + y[1] ** 2}
-    )
+    system = Opaque(lambda t, y: [y[1], -y[0]], dim=2, invariants={"radius": lambda y: y[0] ** 2 + y[1] ** 2})
     assert system.field is system.energy is system.force is None
     assert [function.name for function in system.functions] == ["invariant:radius"]
     with pytest.raises(InputError, match="is not traced"):

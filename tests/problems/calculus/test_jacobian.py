@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import problems
-from problems import Foreign, Hamiltonian, InputError, emit
+from problems import Hamiltonian, InputError, Opaque, emit
 from problems.analysis.invariants import evaluate
 from problems.calculus import jacobian as module
 
@@ -48,7 +48,7 @@ def test_a_constant_field_has_one_entry_which_is_zero():
 
 
 def test_there_is_none_of_functions_that_are_not_traced_and_of_endless_lists(monkeypatch):
-    assert Foreign(lambda t, y: -y, dim=2).jacobian() is None
+    assert Opaque(lambda t, y: -y, dim=2).jacobian() is None
     monkeypatch.setattr(module, "LARGEST", 20)
     assert problems.load("sine_gordon", n=16).system.jacobian() is None
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from integrators import HBVM, integrate
-from problems import Foreign, Problem
+from problems import Opaque, Problem
 from problems.errors import InputError
 from problems.systems.code_digest import code_digest
 
@@ -63,7 +63,7 @@ def test_a_module_imported_within_a_function_counts(module, monkeypatch):
 
 def test_a_resume_with_a_changed_module_is_refused(module, monkeypatch, tmp_path):
     def solve(end, **options):
-        problem = Problem(Foreign(field(module), dim=2, name="mine"), y0=[1.0, 0.0], t_end=5.0)
+        problem = Problem(Opaque(field(module), dim=2, name="mine"), y0=[1.0, 0.0], t_end=5.0)
         return integrate(problem, HBVM(k=8, s=4, tol=1e-8), [end], **options)
 
     path = tmp_path / "run.ckpt"

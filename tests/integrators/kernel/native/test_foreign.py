@@ -16,7 +16,7 @@ import integrators.kernel.events.search
 from integrators import HBVM, Event, Gauss, LineIntegral, integrate
 from integrators.kernel.native import foreign
 from integrators.protocol import Status
-from problems import Foreign, InputError, Problem, VectorField, emit
+from problems import InputError, Opaque, Problem, VectorField, emit
 
 MU = 5.0
 METHODS = [
@@ -43,11 +43,11 @@ def parametric(t, y, par, dy):
 
 TRACED = VectorField(lambda y: van_der_pol(0, y), dim=2, name="van_der_pol")
 WRITTEN = {
-    "python": Foreign(van_der_pol, dim=2),
-    "python in place": Foreign(in_place, dim=2),
-    "python with parameters": Foreign(parametric, dim=2, parameters={"mu": MU}),
-    "numba": Foreign(numba.njit(in_place), dim=2),
-    "numba with parameters": Foreign(numba.njit(parametric), dim=2, parameters={"mu": MU}),
+    "python": Opaque(van_der_pol, dim=2),
+    "python in place": Opaque(in_place, dim=2),
+    "python with parameters": Opaque(parametric, dim=2, parameters={"mu": MU}),
+    "numba": Opaque(numba.njit(in_place), dim=2),
+    "numba with parameters": Opaque(numba.njit(parametric), dim=2, parameters={"mu": MU}),
 }
 
 
@@ -96,7 +96,7 @@ def test_an_ordinary_function_may_do_anything():
             return np.zeros(2)
         return np.array([y[1], -math.sin(y[0]) / table["length"]])
 
-    system = Foreign(
+    system = Opaque(
         pendulum, dim=2, invariants={"energy": lambda y, m: y[1] ** 2 / 2 - m.cos(y[0])}, name="pendulum"
     )
     made = integrate(
@@ -111,7 +111,7 @@ def test_parameters_are_run_time_values_and_arrays_may_be_given_back():
     def decay(t, y, par):
         return -par[1] * y + par[0]
 
-    system = Foreign(decay, dim=1, parameters={"source": 0.0, "rate": 1.0})
+    system = Opaque(decay, dim=1, parameters={"source": 0.0, "rate": 1.0})
     method = Gauss(s=8, h=0.5)
     for rate in (0.5, 2.0):
         made = integrate(Problem(system, y0=[1.0], parameters={"rate": rate}, t_end=2.0), method, [2.0])
@@ -119,14 +119,14 @@ def test_parameters_are_run_time_values_and_arrays_may_be_given_back():
 
 
 def test_the_time_is_the_stages_own():
-    system = Foreign(lambda t, y: [math.cos(t)], dim=1, name="cosine")
+    system = Opaque(lambda t, y: [math.cos(t)], dim=1, name="cosine")
     made = integrate(Problem(system, y0=[math.sin(2.0)], t0=2.0, t_end=-3.0), Gauss(s=8, h=0.5), [-3.0])
     assert abs(made.y[0, 0] - math.sin(-3.0)) < 1e-14  # measured 2.8e-17
 
 
 @pytest.mark.parametrize("field", [lambda t, y: [math.sqrt(1 - t)], lambda t, y: [1 / (y[0] < 0.5)]])
 def test_where_a_function_is_not_defined_is_a_status_with_the_time(field):
-    problem = Problem(Foreign(field, dim=1, name="ends"), y0=[0.0], t_end=9.0)
+    problem = Problem(Opaque(field, dim=1, name="ends"), y0=[0.0], t_end=9.0)
     made = integrate(problem, HBVM(k=4, s=2, h=0.01), sample="steps")
     assert made.status is Status.NOT_FINITE
     assert made.reason == f"the vector field is not finite in the step from t = {made.t_stop!r}."
@@ -144,7 +144,7 @@ def test_any_other_error_is_the_users_to_see():
             raise LookupError("no such table")
         return [1.0]
 
-    problem = Problem(Foreign(broken, dim=1), y0=[0.0], t_end=9.0)
+    problem = Problem(Opaque(broken, dim=1), y0=[0.0], t_end=9.0)
     for method in (
         HBVM(k=4, s=2, h=0.1),
         HBVM(k=4, s=2, tol=1e-6),
@@ -181,7 +181,7 @@ def test_an_error_ends_its_own_member_of_a_batch_only(method):
         return [y[1], -y[0]]
 
     starts = [[1.0, 0.0], [5.0, 0.0], [2.0, 0.0], [20.0, 0.0]]
-    made = method.compile(Foreign(broken, dim=2)).batch(starts, times=[0.5, 2.0])
+    made = method.compile(Opaque(broken, dim=2)).batch(starts, times=[0.5, 2.0])
     assert made.status == [Status.FINISHED, Status.USER_ERROR, Status.FINISHED, Status.USER_ERROR]
     assert "LookupError (no such table) in the step from t = " in made.reason[1]
     exact = np.cos([0.5, 2.0])
@@ -211,7 +211,7 @@ def test_an_error_of_an_events_function_keeps_the_trajectory_and_the_events_befo
             raise LookupError("no such table")
         return float(y[0])
 
-    turn = Problem(Foreign(lambda t, y: [y[1], -y[0]], dim=2), y0=[0.0, 1.0], t_end=60.0)
+    turn = Problem(Opaque(lambda t, y: [y[1], -y[0]], dim=2), y0=[0.0, 1.0], t_end=60.0)
     made = integrate(turn, method, events=Event(g, name="g"))
     assert made.status is Status.USER_ERROR
     assert isinstance(made.error, LookupError)
@@ -221,19 +221,19 @@ def test_an_error_of_an_events_function_keeps_the_trajectory_and_the_events_befo
 
 
 def test_a_result_of_a_wrong_length_is_refused():
-    problem = Problem(Foreign(lambda t, y: [1.0, 2.0, 3.0], dim=2, name="three"), y0=[0.0, 0.0], t_end=1.0)
+    problem = Problem(Opaque(lambda t, y: [1.0, 2.0, 3.0], dim=2, name="three"), y0=[0.0, 0.0], t_end=1.0)
     with pytest.raises(InputError, match=r"three returns an array of shape \(3,\), not \(2,\)"):
         integrate(problem, HBVM(k=4, s=2, h=0.1))
-    problem = Problem(Foreign(lambda t, y: "text", dim=2, name="text"), y0=[0.0, 0.0], t_end=1.0)
+    problem = Problem(Opaque(lambda t, y: "text", dim=2, name="text"), y0=[0.0, 0.0], t_end=1.0)
     with pytest.raises(InputError, match="text returns 'text', not 2 numbers"):
         integrate(problem, HBVM(k=4, s=2, h=0.1))
 
 
 def test_other_arguments_are_refused():
     with pytest.raises(InputError, match="a field has the arguments"):
-        Foreign(lambda t: [t], dim=1)
+        Opaque(lambda t: [t], dim=1)
     with pytest.raises(InputError, match="must be a function, not 3"):
-        Foreign(3, dim=1)
+        Opaque(3, dim=1)
 
 
 @pytest.mark.parametrize(
@@ -256,7 +256,7 @@ def test_methods_that_need_formulas_refuse_with_the_reason(method):
 @pytest.mark.parametrize("kind", ["python", "numba"])
 def test_what_the_kernel_makes_of_a_field_goes_with_its_system(kind):
     written = WRITTEN[kind]
-    system = Foreign(written.f, dim=written.dim)
+    system = Opaque(written.f, dim=written.dim)
     integrate(Problem(system, y0=[2.0, 0.0], t_end=0.5), METHODS[0], times=[0.5])
     assert system in foreign._functions
     gone = weakref.ref(system)
@@ -279,14 +279,12 @@ def test_events_and_checkpoints_work_as_ever():
 
 def test_a_fingerprint_follows_from_the_code_and_what_it_takes_from_around_it():
     def made(a):
-        return emit.fingerprint(Foreign(lambda t, y: [a * y[0]], dim=1, name="same"))
+        return emit.fingerprint(Opaque(lambda t, y: [a * y[0]], dim=1, name="same"))
 
     assert made(1.0) == made(1.0)
     assert made(1.0) != made(2.0)
-    assert emit.fingerprint(Foreign(numba.njit(in_place), dim=2)) == emit.fingerprint(
-        Foreign(in_place, dim=2)
-    )
-    assert emit.fingerprint(Foreign(in_place, dim=2)) != emit.fingerprint(Foreign(parametric, dim=2))
+    assert emit.fingerprint(Opaque(numba.njit(in_place), dim=2)) == emit.fingerprint(Opaque(in_place, dim=2))
+    assert emit.fingerprint(Opaque(in_place, dim=2)) != emit.fingerprint(Opaque(parametric, dim=2))
 
 
 DECAY = {"rate": np.array([1.0])}
@@ -298,7 +296,7 @@ def rate():
 
 def test_a_fingerprint_follows_from_globals_defaults_and_the_functions_it_calls(monkeypatch):
     def of(f):
-        return emit.fingerprint(Foreign(f, dim=1, name="same"))
+        return emit.fingerprint(Opaque(f, dim=1, name="same"))
 
     def calling(t, y):
         return [-rate() * y[0]]
@@ -361,14 +359,14 @@ def with_rate(t, y, a):
     ],
 )
 def test_a_fingerprint_follows_from_the_object_behind_a_field(one, other):
-    before, after = (emit.fingerprint(Foreign(f, dim=1, name="same")) for f in (one, other))
-    assert before == emit.fingerprint(Foreign(one, dim=1, name="same"))
+    before, after = (emit.fingerprint(Opaque(f, dim=1, name="same")) for f in (one, other))
+    assert before == emit.fingerprint(Opaque(one, dim=1, name="same"))
     assert before != after
 
 
 def test_a_fingerprint_follows_from_every_global_and_every_item(monkeypatch):
     def of(f):
-        return emit.fingerprint(Foreign(f, dim=1, name="same"))
+        return emit.fingerprint(Opaque(f, dim=1, name="same"))
 
     def two(t, y):
         return [-A * B * y[0]]
@@ -392,7 +390,7 @@ def test_a_fingerprint_tells_which_of_two_lists_comes_again():
     one, two = [1.0], [2.0]
 
     def of(*lists):
-        return emit.fingerprint(Foreign(partial(with_rate, a=lists), dim=1, name="same"))
+        return emit.fingerprint(Opaque(partial(with_rate, a=lists), dim=1, name="same"))
 
     assert of(one, two, one) != of(one, two, two)
 

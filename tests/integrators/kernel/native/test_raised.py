@@ -12,7 +12,7 @@ from integrators import HBVM, Event, Gauss, integrate
 from integrators.protocol import Status
 
 HENON_HEILES = problems.load("henon_heiles")
-TURN = problems.Problem(problems.Foreign(lambda t, y: [y[1], -y[0]], dim=2), y0=[0.0, 1.0], t_end=10.0)
+TURN = problems.Problem(problems.Opaque(lambda t, y: [y[1], -y[0]], dim=2), y0=[0.0, 1.0], t_end=10.0)
 HEARD = Event(lambda t, y: float(y[0]), name="g")
 LARGE = problems.load("sine_gordon", n=200)
 WHERE = {
@@ -63,7 +63,7 @@ def test_a_second_one_ends_a_function_that_does_not_return():
             time.sleep(0.2)
             signal.pthread_kill(main, signal.SIGINT)
 
-    problem = problems.Problem(problems.Foreign(field, dim=2), y0=[0.0, 1.0], t_end=10.0)
+    problem = problems.Problem(problems.Opaque(field, dim=2), y0=[0.0, 1.0], t_end=10.0)
     integrate(problem, HBVM(k=4, s=2, h=0.1), [0.2])
     threading.Thread(target=press).start()
     started = time.perf_counter()
@@ -79,7 +79,7 @@ def test_a_handler_that_raises_nothing_ends_nothing():
         signal.raise_signal(signal.SIGINT)
         return [y[1], -y[0]]
 
-    problem = problems.Problem(problems.Foreign(field, dim=2), y0=[0.0, 1.0], t_end=1.0)
+    problem = problems.Problem(problems.Opaque(field, dim=2), y0=[0.0, 1.0], t_end=1.0)
     before = signal.signal(signal.SIGINT, lambda number, frame: seen.append(number))
     try:
         made = integrate(problem, HBVM(k=4, s=2, h=0.5), [1.0])

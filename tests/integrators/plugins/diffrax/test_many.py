@@ -5,7 +5,7 @@ import pytest
 
 import problems
 from integrators import HBVM, Gauss, Leapfrog, Status, integrate_many
-from problems import Foreign, Hamiltonian, Problem
+from problems import Hamiltonian, Opaque, Problem
 from problems.errors import InputError
 
 pytest.importorskip("diffrax")
@@ -74,7 +74,7 @@ def test_only_what_does_not_need_the_structure_of_a_poisson_system_runs_on_it():
 
 
 def test_a_field_of_foreign_code_and_an_unknown_backend_are_told():
-    problem = Problem(Foreign(lambda t, y: [y[1], -y[0]], dim=2), y0=[1.0, 0.0], t_end=1.0)
+    problem = Problem(Opaque(lambda t, y: [y[1], -y[0]], dim=2), y0=[1.0, 0.0], t_end=1.0)
     with pytest.raises(InputError, match="not traced"):
         integrate_many(problem, Gauss(s=2, h=0.1), starts=[[1.0, 0.0]], backend="jax")
     with pytest.raises(InputError, match="unknown backend 'jaxx'"):

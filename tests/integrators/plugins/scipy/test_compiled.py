@@ -14,7 +14,7 @@ import problems
 from integrators.plugins import scipy as plugin
 from integrators.plugins.scipy import HBVM, Gauss, field
 from problems.errors import InputError
-from problems.systems.untraced import Foreign
+from problems.systems.opaque import Opaque
 
 PENDULUM = problems.load("pendulum")
 Y0 = PENDULUM.y0
@@ -123,7 +123,7 @@ def test_nfev_is_the_number_of_states_at_which_the_field_was_evaluated() -> None
         calls += 1
         return python(t, y)
 
-    solution = solve(field(Foreign(counting, dim=2)), 5.0, t_eval=np.linspace(0.0, 5.0, 7))
+    solution = solve(field(Opaque(counting, dim=2)), 5.0, t_eval=np.linspace(0.0, 5.0, 7))
     assert solution.nfev == calls
     assert calls > 0
 

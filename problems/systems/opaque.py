@@ -1,0 +1,157 @@
+"""Opaque systems, whose right-hand side is not traced: a numba function, or any Python function."""
+
+import inspect
+from collections.abc import Callable, Mapping
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from problems.calculus.function import Function
+from problems.checks import NOTHING, Named, at_least, checked_arguments
+from problems.errors import InputError, shown
+from problems.systems.base import System, Value
+
+Array = NDArray[np.float64]
+
+UNDEFINED = (ArithmeticError, ValueError)  # 1/0, math.sqrt(-1): not a number, as in compiled code
+
+
+class Opaque(System):
+    """A system y' = f(t, y) whose right-hand side is code and is not traced.
+
+    A numba function is called from compiled code at full speed. Any other Python function is called back from
+    compiled code, which adds a few microseconds to each evaluation: it is slow, and
+    ``Solution.stats.extra["field"]`` says so.
+
+    Parameters
+    ----------
+    f : callable
+        ``f(t, y)``, which returns the derivative, or ``f(t, y, dy)``, which writes it to ``dy``; ``y`` and
+        ``dy`` are arrays of shape (dim,). If the third argument is called ``par``, it receives the parameters
+        as one flat array, in the order of declaration.
+    dim : int
+        Length of the state.
+    parameters, invariants, guards, name
+        As for `VectorField`; invariants and guards are traced, and evaluated in double-double.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For a function with other arguments.
+
+    Notes
+    -----
+    If f divides by zero or leaves a function's domain (`ArithmeticError`, `ValueError`), its value is NaN and
+    the integration ends with the status ``not_finite``. Other exceptions of a Python function are raised in
+    the first step; later they end the integration with the status ``user_error``. Exceptions of a numba
+    function are printed, and its value is NaN. Jacobians are approximated by differences. Methods that need
+    formulas (LineIntegral, Taylor, those of diffrax) refuse such a system.
+
+    Examples
+    --------
+    >>> from problems import Opaque
+    >>> def van_der_pol(t, y):
+    ...     return [y[1], (1 - y[0]**2)*y[1] - y[0]]
+    >>> Opaque(van_der_pol, dim=2)
+    Opaque(van_der_pol, dim=2)
+    """
+
+    kind = "vector_field"
+    traced = False
+
+    @checked_arguments
+    def __init__(
+        self,
+        f: Callable[..., Any],
+        *,
+        dim: Annotated[int, at_least(1)],
+        parameters: Named[Value] = NOTHING,
+        invariants: Named[Callable[..., Any]] = NOTHING,
+        guards: Named[Callable[..., Any]] = NOTHING,
+        name: str | None = None,
+    ) -> None:
+        if not callable(f):
+            raise InputError(f"f must be a function, not {shown(f)}.")
+        super().__init__(f, dim, None, parameters, invariants, guards, name)
+        self._take(f)
+        self._trace_declared(invariants, guards)
+
+    def _take(self, f: Callable[..., Any]) -> None:
+        self.f = f
+        self.takes_parameters, self.in_place = _form(f)
+        self.numba = hasattr(f, "py_func") and hasattr(f, "inspect_llvm")
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the state with the function itself, which pickle can keep and JSON cannot."""
+        return {**super().__getstate__(), "f": self.f}
+
+    def __setstate__(self, state: Mapping[str, Any]) -> None:
+        super().__setstate__(state)
+        self._take(state["f"])
+
+    def __repr__(self) -> str:
+        return f"Opaque({self.name}, dim={self.dim})"
+
+    @property
+    def written(self) -> str:
+        """Kind of the function, for statistics."""
+        return "numba function" if self.numba else "Python function, slow"
+
+    def function(self, name: str) -> Function:
+        """Return a traced function as `System.function` does; the field is not traced."""
+        if name == "field":
+            kind = self.written.partition(",")[0]
+            raise InputError(
+                f"{self.name} is not traced: its field is a {kind}; write it as a VectorField or "
+                "Hamiltonian for what needs the formula."
+            )
+        return super().function(name)
+
+    def evaluate(self, t: float, y: Array, par: Array, out: Array) -> None:
+        """Write the derivative at one state to ``out``; NaN if it is not defined.
+
+        NumPy warns of that, unless the caller suppresses it with ``np.errstate``.
+
+        Raises
+        ------
+        problems.errors.InputError
+            If f does not return dim numbers.
+        """
+        arguments = (t, y, par) if self.takes_parameters else (t, y)
+        try:
+            if self.in_place:
+                out[:] = np.nan
+                self.f(*arguments, out)
+                return
+            value = self.f(*arguments)
+        except UNDEFINED:
+            out[:] = np.nan
+            return
+        try:
+            array = np.asarray(value, dtype=np.float64)
+        except (TypeError, ValueError, OverflowError) as error:
+            raise InputError(f"{self.name} returns {shown(value)}, not {self.dim} numbers.") from error
+        if array.shape != (self.dim,):
+            raise InputError(
+                f"{self.name} returns an array of shape {array.shape}, not ({self.dim},): "
+                "one derivative for each component of y."
+            )
+        out[:] = array
+
+
+def _form(f: Callable[..., Any]) -> tuple[bool, bool]:
+    """Return whether a function takes parameters, and whether it takes the array for its result."""
+    try:
+        signature = inspect.signature(getattr(f, "py_func", f))
+    except (TypeError, ValueError):
+        return False, False  # a builtin: f(t, y)
+    kinds = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
+    names = [p.name for p in signature.parameters.values() if p.kind in kinds and p.default is p.empty]
+    takes_parameters = names[2:3] == ["par"]
+    rest = len(names) - 2 - takes_parameters
+    if rest not in (0, 1):
+        raise InputError(
+            f"a field has the arguments (t, y), (t, y, dy), (t, y, par) or (t, y, par, dy), not {names!r}."
+        )
+    return takes_parameters, rest == 1
