@@ -76,6 +76,11 @@ class Hits:
         """Why the integration has ended, as a sentence."""
         return f"the event {self.terminal!r} ended the integration at t = {self.stop!r}."
 
+    def last(self) -> tuple[float, Array]:
+        """Return when the last of all has happened, and the state after it."""
+        t, _, after, _, _ = self._pieces[-1]
+        return float(t[-1]), after[-1].copy()
+
     def occurrences(self) -> dict[str, Occurrences]:
         """Return what has happened, by the events' names."""
         t, y, after, event, direction = self._joined()

@@ -294,7 +294,7 @@ class TaylorStepper(RestorableStepper):
         if self.search is None or not self.search.over:
             return False
         hits = self.search.hits
-        self._fail(Status.EVENT, hits.stop, hits.reason)
+        self._fail(Status.EVENT, *hits.last(), hits.reason)
         return True
 
     def _place(self, t: float, y: Array) -> None:
@@ -340,7 +340,7 @@ class TaylorStepper(RestorableStepper):
         if outcome == self._outcome.success:
             self._stats.steps, self._stepped = self._stats.steps + 1, True
             return None if self._ends() else abs(h)
-        self._broken(t)
+        self._broken(t, self._ta.tc[:, 0])
         return None
 
     def _step_to(self, t: float, *, write_tc: bool = False) -> bool:
@@ -357,9 +357,12 @@ class TaylorStepper(RestorableStepper):
             if outcome == self._outcome.time_limit:
                 return True
             if outcome == self._outcome.err_nf_state:
-                self._broken(self._ta.time if np.isfinite(self._ta.time) else before)
+                if not write_tc:  # the coefficients have the state before the step that failed
+                    self._place(self._t, self._y)
+                    self._ta.propagate_until(t, write_tc=True)
+                self._broken(self._ta.time if np.isfinite(self._ta.time) else before, self._ta.tc[:, 0])
             elif stalled := watch.sees(self._ta.time, steps):
-                self._fail(Status.STALLED, self._ta.time, stalled)
+                self._fail(Status.STALLED, self._ta.time, self._ta.state, stalled)
             if self._status is not Status.RUNNING:
                 return False
 
@@ -394,8 +397,8 @@ class TaylorStepper(RestorableStepper):
             self.search.take_back(ta.time)
         self._stats.extra["side_steps"] += 1
 
-    def _broken(self, t: float) -> None:
-        self._fail(Status.NOT_FINITE, t, f"heyoka met a state that is not finite in the step from t = {t!r}.")
+    def _broken(self, t: float, y: Array) -> None:
+        self._fail(Status.NOT_FINITE, t, y, f"heyoka met a state that is not finite in the step from t = {t!r}.")
 
     def _save(self) -> Any:
         return copy.copy(self._ta), self._sign, self._stepped
