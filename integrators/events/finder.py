@@ -78,8 +78,8 @@ class Hits:
 
     def last(self) -> tuple[float, Array]:
         """Return when the last of all has happened, and the state after it."""
-        t, _, after, _, _ = self._pieces[-1]
-        return float(t[-1]), after[-1].copy()
+        t, y, after, event, _ = self._pieces[-1]
+        return float(t[-1]), (after if self._acts[event[-1]] else y)[-1].copy()
 
     def occurrences(self) -> dict[str, Occurrences]:
         """Return what has happened, by the events' names."""

@@ -96,6 +96,8 @@ class Run:
         self._par = problem.par
         self._before: list[Mapping[str, Occurrences]] = []
         self._shown: tuple[float, Array] | None = None
+        self._terminates = any(event.last for event in self._wanted.values())
+        self._over = False  # whether a terminal event has happened in the step ahead
         digits = start is not None or method.precision != "double"
         if digits:
             check_digits(method, events=bool(self._wanted), variations=False)
@@ -120,17 +122,24 @@ class Run:
         if self._wanted:
             self._before.append(self._stepper.search.hits.occurrences())
         self._begin(y, t)
-        self._shown = None
+        self._shown, self._over = None, False
+
+    @property
+    def _present(self) -> tuple[float, Array]:
+        """The time and the state: after a terminal event its own, which lies within a step."""
+        if self.status is Status.EVENT:
+            return self._stepper.search.hits.last()
+        return self._shown or (self._stepper.t, self._stepper.y)
 
     @property
     def t(self) -> float:
-        """The present time."""
-        return self._stepper.t if self._shown is None else self._shown[0]
+        """The present time; after a terminal event its time."""
+        return self._present[0]
 
     @property
     def y(self) -> Array:
         """The present state, shape (dim,), q then p; it can be set, as a whole."""
-        return _frozen(self._stepper.y if self._shown is None else self._shown[1])
+        return _frozen(self._present[1])
 
     @y.setter
     def y(self, state: ArrayLike) -> None:
@@ -195,12 +204,12 @@ class Run:
     @property
     def status(self) -> Status:
         """How it stands: ``RUNNING``, ``EVENT`` after a terminal event, or why it failed."""
-        return self._stepper.status
+        return Status.EVENT if self._over else self._stepper.status
 
     @property
     def reason(self) -> str:
-        """One sentence on a failure; empty otherwise."""
-        return self._stepper.reason
+        """One sentence on a failure or a terminal event; empty otherwise."""
+        return self._stepper.search.hits.reason if self._over else self._stepper.reason
 
     @property
     def events(self) -> dict[str, Occurrences]:
@@ -227,17 +236,17 @@ class Run:
 
         After `until` that is the rest of the step in which that time lies.
         """
-        if self._stepper.status is Status.RUNNING:
+        if self.status is Status.RUNNING:
             self._stepper.step()
             self._shown = None
-        return self._stepper.status
+        return self.status
 
     def until(self, t: float) -> Array:
         """Go to a time, ahead or back, and return the state there.
 
         The method's steps do not depend on it: the state is what `integrate` returns for this time, and the
-        next step goes on to where it would have ended. Where the method fails before, `status` and `reason`
-        say so, and the time and the state are those that were reached.
+        next step goes on to where it would have ended. Where the method fails before, or a terminal event
+        happens, `status` and `reason` say so, and the time and the state are those that were reached.
 
         Parameters
         ----------
@@ -254,10 +263,21 @@ class Run:
             If it is no finite number.
         """
         (goal,) = check_times([t], self.t).tolist()
-        if self._stepper.status is Status.RUNNING and goal != self.t:
+        if self.status is Status.RUNNING and goal != self.t:
             samples = self._stepper.advance(np.array([goal]))
             self._shown = (goal, samples.y[0]) if samples.t.size else None
+            if self._terminates and self._stepper.status is Status.RUNNING:
+                self._look_to(goal)
         return self.y
+
+    def _look_to(self, goal: float) -> None:
+        """Look whether a terminal event lies in the part of the step ahead that ends at ``goal``."""
+        search = self._stepper.search
+        kept = search.save()
+        self._stepper.look_to(goal)
+        self._over = search.hits.terminal is not None
+        if not self._over and search.trouble is None:
+            search.load(kept)  # the step is looked at as a whole when it is taken
 
     def energy(self) -> float:
         """Return the energy at the present state, with the present parameters.
