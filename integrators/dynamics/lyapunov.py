@@ -17,7 +17,7 @@ import numpy as np
 
 from integrators import registry
 from integrators.dynamics.vectors import with_variations
-from integrators.protocol import Array, MethodBase, Status
+from integrators.protocol import Array, MethodBase, Status, check_is_problem
 from problems.checks import at_least, checked_arguments
 from problems.errors import InputError
 from problems.problem import Problem
@@ -112,6 +112,7 @@ def lyapunov(
     >>> found.exponents.shape, found.pairs < 1e-10
     ((4,), True)
     """
+    check_is_problem(problem)
     method = registry.create("HBVM") if method is None else method
     system, end = problem.system, problem.t_end if t_end is None else t_end
     n = system.dim if count is None else count

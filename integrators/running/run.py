@@ -139,7 +139,7 @@ class Run:
     @property
     def y(self) -> Array:
         """The present state, shape (dim,), q then p; it can be set, as a whole."""
-        return _frozen(self._present[1])
+        return _frozen(self._present[1], "y = run.y.copy(), then run.y = y")
 
     @y.setter
     def y(self, state: ArrayLike) -> None:
@@ -167,7 +167,7 @@ class Run:
         ((4,), (4, 2), (4,))
         """
         self._check_digits()
-        return _frozen(self._stepper.pairs)
+        return _frozen(self._stepper.pairs, "run.pairs = ...")
 
     @pairs.setter
     def pairs(self, state: Any) -> None:
@@ -190,7 +190,7 @@ class Run:
     @property
     def par(self) -> Array:
         """The parameters, shape (n_par,), as `System.pack` has them; they can be set, by name too."""
-        return _frozen(self._par)
+        return _frozen(self._par, 'run.par = {"name": value}')
 
     @par.setter
     def par(self, values: ArrayLike | Mapping[str, Any]) -> None:
@@ -294,11 +294,31 @@ class Run:
         return float(values["energy"][0])
 
     def __repr__(self) -> str:
-        return f"Run({self.problem!r}, {self.method!r}, {self.status} at t = {self.t!r})"
+        return f"Run({self.problem!s}, {self.method!r}, {self.status} at t = {self.t!r})"
 
 
-def _frozen(array: Array) -> Array:
-    """Return a copy that cannot be written to: what is written to it would change nothing."""
-    copy = array.copy()
+class _Whole(np.ndarray):
+    """A copy of what can be set as a whole only: what was written into it would change nothing."""
+
+    setting = ""
+
+    def __setitem__(self, key: Any, value: Any) -> None:
+        if not self.setting:
+            return super().__setitem__(key, value)
+        raise InputError(f"its parts are read-only; set the whole: {self.setting}.")
+
+    def __array_finalize__(self, obj: Any) -> None:
+        self.setting = ""  # what is calculated from it is an array like others
+
+    def __getitem__(self, key: Any) -> Any:
+        if isinstance(key, str) and self.setting:
+            raise InputError(f"{key!r} is no index of it; system.unpack(run.par)[{key!r}] is the parameter.")
+        return super().__getitem__(key)
+
+
+def _frozen(array: Array, setting: str) -> Array:
+    """Return a copy that refuses to be written to, and says how to set the whole."""
+    copy = array.copy().view(_Whole)
+    copy.setting = setting
     copy.flags.writeable = False
     return copy
