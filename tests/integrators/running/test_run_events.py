@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 
 import problems
-from integrators import HBVM, Event, Gauss, LineIntegral, Status, Taylor, integrate, start
+from integrators import HBVM, Event, Gauss, LineIntegral, Status, Taylor, integrate, integrate_many, start
 from integrators.protocol import MethodBase
 
 BALL = problems.Problem(
-    problems.Hamiltonian(lambda q, p, par, m: p[0] ** 2 / 2 + q[0] + par.k * m.sin(q[0]), dof=1, parameters={"k": 0.01}),
+    problems.Hamiltonian(
+        lambda q, p, par, m: p[0] ** 2 / 2 + q[0] + par.k * m.sin(q[0]), dof=1, parameters={"k": 0.01}
+    ),
     q0=[1.0], p0=[0.0], t_end=10.0,
 )  # fmt: skip
 FLOOR = Event(lambda q: q[0], direction=-1, terminal=True, name="floor")
@@ -83,3 +85,17 @@ def test_heyoka_keeps_the_samples_of_the_step_in_which_the_event_lies() -> None:
     solution = integrate(BALL, Taylor(), [0.5, 1.2, 1.3, 1.4, 1.405, 2.0], events=FLOOR)
     assert solution.t.tolist() == [0.5, 1.2, 1.3, 1.4, 1.405]
     assert solution.status is Status.EVENT
+
+
+@pytest.mark.parametrize("method", METHODS, ids=str)
+def test_a_terminal_event_before_all_samples_leaves_its_state(method: MethodBase) -> None:
+    solution = integrate(BALL, method, [10.0], events=FLOOR)
+    floor = solution.events["floor"]
+    assert (solution.t.tolist(), solution.y.tolist()) == (floor.t.tolist(), floor.y.tolist())
+    assert solution.t_stop == solution.t[0]
+    assert integrate(BALL, method, [0.5, 10.0], events=FLOOR).t.tolist() == [0.5]
+    many = integrate_many(BALL, method, starts=[[1.0, 0.0], [2.0, 0.0]], times=[10.0], events=FLOOR)
+    assert np.isnan(many.y).all()
+    assert many[0].t == pytest.approx(floor.t, abs=1e-14)  # measured 0
+    assert many[1].t.tolist() == many.events[1]["floor"].t.tolist()
+    assert many[1].y.tolist() == many.events[1]["floor"].y.tolist()
