@@ -108,10 +108,13 @@ class Solutions(Trajectories):
         there = np.isfinite(times) & ~np.isnan(self.y[i]).any(axis=1)
         asked = times[np.isfinite(times)]
         parameters: dict[str, Any] = {**system.unpack(self.par[i])}
+        t, y = times[there], self.y[i][there]
+        if not t.size and self.status[i] is Status.EVENT and self.variations is None:
+            t, y = self._at_event(i)
         end = float(asked[-1]) if asked.size and asked[-1] != self.problem.t0 else self.problem.t_end
         return Solution(
-            t=times[there],
-            y=self.y[i][there],
+            t=t,
+            y=y,
             status=self.status[i],
             reason=self.reason[i],
             t_stop=float(self.t_stop[i]),
@@ -130,6 +133,13 @@ class Solutions(Trajectories):
             variations=None if self.variations is None else self.variations[i][there],
             directions=None if self.directions is None else (self.directions[0][i], self.directions[1][i]),
         )
+
+    def _at_event(self, i: int) -> tuple[Array, Array]:
+        """Return the time and the state of the terminal event that ended trajectory i, as rows."""
+        for hits in self.events[i].values():
+            if hits.t[-1:].tolist() == [self.t_stop[i]]:
+                return hits.t[-1:], (hits.y if hits.after is None else hits.after)[-1:]
+        return np.empty(0), np.empty((0, self.y.shape[2]))
 
     def _some(self, numbers: NDArray[np.int64]) -> "Solutions":
         chosen = numbers.tolist()

@@ -805,4 +805,4 @@ def check_problem(problem: Problem, method: MethodBase) -> None:
         raise InputError(f"method must be a method such as HBVM(k=8, s=4, h=0.1), not {shown(method)}.")
     reason = method.accepts(problem)
     if reason is not None:
-        raise InputError(f"{method!r} cannot integrate {problem!r}: {reason}")
+        raise InputError(f"{method!r} cannot integrate {problem!s}: {reason}")

@@ -400,7 +400,7 @@ class Solution:
 
     def __repr__(self) -> str:
         return printable(
-            f"Solution({self.problem!r}, {self.method!r}, {self.status} at t = {self.t_stop!r}, "
+            f"Solution({self.problem!s}, {self.method!r}, {self.status} at t = {self.t_stop!r}, "
             f"{self.t.size} states)"
         )
 

@@ -41,6 +41,8 @@ from integrators.running.watchdog import StallDetector
 from problems.errors import unknown
 from problems.problem import System
 
+WHOLE = 1e-6  # of a step, which is rounding where steps are counted
+
 __all__ = ["FixedStep", "FixedStepper", "March", "ProgramBase", "RestorableStepper", "StepperBase"]
 
 
@@ -94,7 +96,8 @@ class StepperBase:
 
     The current time ``t`` and state ``y`` are those last returned. The library itself may be ahead of them
     (an adaptive method, whose steps are not shortened for a sample) or behind (a fixed step size, if the
-    sample is the end of a partial step).
+    sample is the end of a partial step). After a failure they are the last state that was reached, with its
+    time: `_fail` takes both.
     """
 
     samplings: ClassVar[tuple[str, ...]] = ()
@@ -115,7 +118,7 @@ class StepperBase:
 
     @property
     def t(self) -> float:
-        """The current time; after a failure, the time of the failure."""
+        """The current time; after a failure, that of the last state that was reached."""
         return self._t
 
     @property
@@ -144,8 +147,8 @@ class StepperBase:
         """Take one step of the method; after a failure, do nothing."""
         if self._status is Status.RUNNING:
             reached = self._one_step()
-            if reached is not None and self._finite(*reached):
-                self._arrive(*reached)
+            if reached is not None:
+                self._reached(np.array(reached[:1]), np.array(reached[1])[np.newaxis])
         return self._status
 
     @one_thread
@@ -166,10 +169,8 @@ class StepperBase:
         if ahead.size:
             more = self._step_states(float(ahead[-1])) if how == "steps" else self._serve(ahead, how)
             t, y = np.concatenate([t, more[0]]), np.concatenate([y, more[1]])
-            if t.size and not self._finite(float(t[-1]), y[-1]):
-                t, y = t[:-1], y[:-1]
-            if t.size and not self._status.failed:
-                self._arrive(float(t[-1]), y[-1])
+            if t.size:
+                t, y = self._reached(t, y)
         status = Status.FINISHED if self._status is Status.RUNNING else self._status
         return Samples(t, y, status, self._reason)
 
@@ -185,25 +186,38 @@ class StepperBase:
         Short runs are timed this way, and each of NumPy's calls left out here weighs in them.
         """
         grid, states = self._serve(time.copy(), "stop")
-        if grid.size and not self._finite(float(grid[-1]), states[-1]):
-            grid, states = grid[:-1], states[:-1]
-        if grid.size and not self._status.failed:
+        if grid.size and not self._status.failed and are_finite(states[-1]):
             self._t, self._y = time.item(), states[-1].copy()
+        elif grid.size:
+            grid, states = self._reached(grid, states)
         status = self._status if self._status.failed else Status.FINISHED
         return Samples(grid, states, status, self._reason)
 
     def _arrive(self, t: float, y: Array) -> None:
         self._t, self._y = t, np.array(y, dtype=np.float64)
 
-    def _finite(self, t: float, y: Array) -> bool:
-        if are_finite(y):
-            return True
+    def _reached(self, t: Array, y: Array) -> tuple[Array, Array]:
+        """Arrive at the last of some states and return them, without the last where it is not finite."""
+        end, finite = float(t[-1]), are_finite(y[-1])
+        if not finite:
+            t, y = t[:-1], y[:-1]
         if not self._status.failed:
-            self._fail(Status.NOT_FINITE, t, f"the state is not finite at t = {t!r}.")
-        return False
+            if t.size:
+                self._arrive(float(t[-1]), y[-1])
+            if not finite:
+                last = self._last_finite(end)
+                self._fail(Status.NOT_FINITE, *last, f"the state is not finite at t = {end!r}.")
+        return t, y
 
-    def _fail(self, status: Status, t: float, reason: str) -> None:
-        self._t, self._status, self._reason = t, status, reason
+    def _last_finite(self, t: float) -> tuple[float, Array]:
+        """Return the last finite state on the way from the present to ``t``, and its time before it."""
+        return self._t, self._y
+
+    def _fail(self, status: Status, t: float, y: Array, reason: str) -> None:
+        """End with the state ``y``, reached at ``t``; where one of them is not finite, at the present."""
+        if math.isfinite(t) and are_finite(y):
+            self._arrive(t, y)
+        self._status, self._reason = status, reason
 
     def _serve(self, grid: Array, how: str) -> tuple[Array, Array]:
         """Return a leading part of ``grid`` (all of it ahead of the present) and the states there.
@@ -285,11 +299,14 @@ class FixedStepper(RestorableStepper):
     samplings = ("partial", "steps", "stop")
     at_once = 1 << 14
     """Steps between two looks at Ctrl-C."""
+    marks = True
+    """Whether `_save_steps` costs less than a step."""
 
     def __init__(self, program: Any, y: Array, par: Array, t: float):
         super().__init__(y, t)
         self._program, self._par, self._here = program, par, y.copy()
         self._t0, self._n, self._h = t, 0, program.method.h
+        self._behind: tuple[float, int, Any] | None = None  # where the last steps began
         if not program.system.traced:  # slow anyway, and known is then which step it was that failed
             self.at_once = 1
         if getattr(program.method, "evaluations", None) is not None:
@@ -301,16 +318,46 @@ class FixedStepper(RestorableStepper):
     def _towards(self, end: float) -> None:
         """Turn round where ``end`` lies on the other side of the present: steps count from here then."""
         if (end - self._t) * self._h < 0.0:
-            self._t0, self._n, self._h = self._t, 0, -self._h
+            self._t0, self._n, self._h, self._behind = self._t, 0, -self._h, None
             self._restart(self._t, self._y, self._h)
 
     def _go(self, n: int) -> None:
-        """March to the step with number ``n``, or to a failure."""
+        """March to the step with number ``n``, to a failure, or some steps beyond the last finite state."""
         while self._n < n and not self._status.failed:
             count = min(n - self._n, self.at_once)
+            if self.marks:
+                self._behind = self._t0, self._n, self._save_steps()
             self._march(count)
             self._stats.steps += count
             self._n += count
+            if self._n < n and not are_finite(self._state()):
+                return
+
+    def _last_finite(self, t: float) -> tuple[float, Array]:
+        """Return the end of the last step whose state is finite: by steps taken again, in halves."""
+        last = self._t, self._y
+        if are_finite(state := self._state()):  # that between two steps is not
+            return (self._time(), state) if (self._time() - self._t) * self._h > 0.0 else last
+        self._stats, stats = self._stats.copy(), self._stats
+        self._t0, self._n, mark = self._behind or (self._t, 0, None)
+        if mark is not None and (self._time() - self._t) * self._h > 0.0:
+            self._load_steps(mark)
+            last = self._time(), self._state()
+        left = int((t - self._time()) / self._h + WHOLE)
+        count = 1 << left.bit_length()
+        while count := count // 2:
+            if count > left:
+                continue
+            if mark is None:
+                self._restart(*last, self._h)
+            else:
+                self._load_steps(mark)
+            self._march(count)
+            if are_finite(state := self._state()):
+                self._n, left = self._n + count, left - count
+                last, mark = (self._time(), state), None if mark is None else self._save_steps()
+        self._stats = stats
+        return last
 
     def _serve(self, grid: Array, how: str) -> tuple[Array, Array]:
         self._towards(float(grid[-1]))
@@ -360,6 +407,7 @@ class FixedStepper(RestorableStepper):
 
     def _load(self, inner: Any) -> None:
         self._t0, self._n, self._h, steps = inner
+        self._behind = None
         self._load_steps(steps)
 
     def _march(self, count: int) -> None:
@@ -374,8 +422,11 @@ class FixedStepper(RestorableStepper):
         except Exception as error:
             if self._program.system.traced:
                 raise
-            start, y[:], self.error = t + first * h, np.nan, error
-            self._fail(Status.USER_ERROR, start, f"{UserError(error)} in the step from t = {start!r}.")
+            start, before, self.error = t + first * h, y.copy(), error
+            y[:] = np.nan
+            self._fail(
+                Status.USER_ERROR, start, before, f"{UserError(error)} in the step from t = {start!r}."
+            )
 
     def _evaluated(self, steps: int) -> None:
         if (each := self._program.method.evaluations) is not None:

@@ -91,10 +91,20 @@ class PostNewtonian(CheckedOptions):
     ``-p_a^4/(8 m_a^3) + G^2 m_a (sum_b m_b/r_ab)^2/2`` and over pairs a, b, both ways, of
     ``-(G m_a m_b/(4 r_ab)) (6 p_a^2/m_a^2 - (7 p_a.p_b + (n_ab.p_a)(n_ab.p_b))/(m_a m_b))``, all over c^2.
 
+    Beside massless bodies or functions among the forces it is the acceleration of Einstein, Infeld and Hoffmann
+    in positions and velocities, in harmonic coordinates, which are those of ADM to this order. The two forms differ
+    by terms of the order 1/c^4, and the energy is conserved to that order only. With other forces there are no
+    terms of both.
+
     Parameters
     ----------
     c : float
         The velocity of light, in the units of the bodies.
+
+    References
+    ----------
+    A. Einstein, L. Infeld, B. Hoffmann, The gravitational equations and the problem of motion, Annals of
+    Mathematics 39 (1938), 65-100; in this form E. Poisson, C. M. Will, Gravity (2014), equation 9.127.
 
     Examples
     --------
@@ -126,6 +136,43 @@ class PostNewtonian(CheckedOptions):
         for a in range(n):
             total = total + G * G * masses[a] * depth[a] * depth[a] / 2
         return total / self.c**2
+
+    def pull(
+        self, x: list[list[Any]], v: list[list[Any]], mu: list[Any], newton: list[list[Any]], m: Any
+    ) -> list[list[Any]]:
+        """Return the accelerations that it adds, of all bodies, of which the first ones have the masses.
+
+        ``mu`` is G times them, and ``newton`` the accelerations of these by Newton's attraction.
+        """
+        n, total = len(mu), len(x)
+        depth: list[Any] = [0.0] * total
+        r: dict[tuple[int, int], Any] = {}
+        for a in range(total):
+            for b in range(min(a, n)):
+                d = [x[a][i] - x[b][i] for i in range(3)]
+                r[a, b] = r[b, a] = m.sqrt(_dot(d, d))
+                depth[a] = depth[a] + mu[b] / r[a, b]
+                if a < n:
+                    depth[b] = depth[b] + mu[a] / r[a, b]
+        added = []
+        for a in range(total):
+            sums: list[Any] = [0.0] * 3
+            for b in (b for b in range(n) if b != a):
+                d = [x[b][i] - x[a][i] for i in range(3)]
+                square = r[a, b] * r[a, b]
+                along, inverse = _dot(d, v[b]), mu[b] / (square * r[a, b])
+                factor = (
+                    _dot(v[a], v[a]) + 2 * _dot(v[b], v[b]) - 4 * _dot(v[a], v[b])
+                    - 1.5 * along * along / square - 4 * depth[a] - depth[b] + _dot(d, newton[b]) / 2
+                )  # fmt: skip
+                drag = 3 * along - 4 * _dot(d, v[a])
+                for i in range(3):
+                    sums[i] = sums[i] + (
+                        inverse * (factor * d[i] + drag * (v[a][i] - v[b][i]))
+                        + 3.5 * mu[b] / r[a, b] * newton[b][i]
+                    )  # fmt: skip
+            added.append([component / self.c**2 for component in sums])
+        return added
 
 
 Force = J2 | PostNewtonian | Callable[..., Any]
@@ -179,8 +226,8 @@ def nbody(
     Raises
     ------
     problems.errors.InputError
-        For arrays of other shapes, masses that are not positive, two bodies at one place, and
-        `PostNewtonian` with massless bodies or a function.
+        For arrays of other shapes, masses that are not positive, two bodies at one place, and softening with
+        `PostNewtonian` beside massless bodies or a function.
 
     Examples
     --------
@@ -218,12 +265,13 @@ def nbody(
         )  # fmt: skip
         momenta = _momenta(system, t0, x.reshape(-1), v, mass) if forces else (mass[:, None] * v).reshape(-1)
         return Problem(system, q0=x.reshape(-1), p0=momenta, t0=t0, t_end=t_end)
-    if any(isinstance(force, PostNewtonian) for force in forces):
+    relativity = [force for force in forces if isinstance(force, PostNewtonian)]
+    if relativity and softening is not None:
         raise InputError(
-            "PostNewtonian acts on bodies with masses, by its Hamiltonian: give massless bodies a small "
-            "mass, and leave out functions among the forces."
+            f"softening={softening!r} has no relativistic form beside massless bodies or functions among the "
+            "forces; leave out softening= or PostNewtonian."
         )
-    field = _accelerated(n, massless, softening, [f for f in forces if isinstance(f, J2)], fields)
+    field = _accelerated(n, massless, softening, [f for f in forces if isinstance(f, J2)], fields, relativity)
     system = VectorField(
         field, dim=6 * (n + massless), parameters={"m": tuple(mass.tolist()), "G": G}, name=called
     )
@@ -231,7 +279,12 @@ def nbody(
 
 
 def _accelerated(
-    n: int, massless: int, softening: float | None, flattened: list[J2], fields: list[Callable[..., Any]]
+    n: int,
+    massless: int,
+    softening: float | None,
+    flattened: list[J2],
+    fields: list[Callable[..., Any]],
+    relativity: list[PostNewtonian],
 ) -> Callable[..., list[Any]]:
     """Return the derivative of positions and velocities."""
     total = n + massless
@@ -254,10 +307,14 @@ def _accelerated(
                 square = _dot(d, d) if softening is None else _dot(d, d) + softening**2
                 cubed = square * m.sqrt(square)
                 pull(i, j, [-d[c] / cubed for c in range(3)])
+        newton = [list(row) for row in pulled[:n]]
         for force in flattened:
             for j in range(total):
                 if j != force.body:
                     pull(force.body, j, force.pull([x[j][c] - x[force.body][c] for c in range(3)], m))
+        for force in relativity:
+            added = force.pull(x, v, [par.G * par.m[i] for i in range(n)], newton, m)
+            pulled = [[a + b for a, b in zip(*rows, strict=True)] for rows in zip(pulled, added, strict=True)]
         given = {"t": t, "x": x, "v": v, "masses": [par.m[i] for i in range(n)] + [0.0] * massless, "m": m}
         for force in fields:
             for j, more in enumerate(_called(force, given, total)):

@@ -194,20 +194,25 @@ class Problem:
         for key, value in {**state, **frozen, "arguments": MappingProxyType(state["arguments"])}.items():
             object.__setattr__(self, key, value)
 
-    def __repr__(self) -> str:
+    def written(self) -> str:
+        """Return the call that makes it, with all its numbers."""
         if self.name is None:
             return printable(f"Problem({self._made_with})")
         inside = ", ".join(f"{key}={value!r}" for key, value in self.arguments.items())
         return printable(f"{self.name}({inside})")
 
+    def __repr__(self) -> str:
+        """Return the call that makes a problem with a name; of another the same, with long lists in short."""
+        return str(self) if self.name is None else self.written()
+
     def __str__(self) -> str:
         """Return what it prints as, with long lists of numbers in short."""
-        text = re.sub(r"\[[^\[\]]*\]", _short, repr(self))
+        text = re.sub(r"\[[^\[\]]*\]", _short, self.written())
         return text if len(text) <= LONGEST else f"{text[: LONGEST // 2]} ... {text[-LONGEST // 2 :]}"
 
     def _identity(self) -> tuple[Any, ...]:
         return (
-            repr(self),
+            self.written(),
             emit.fingerprint(self.system),
             self.y0.tobytes(),
             self.par.tobytes(),

@@ -1,6 +1,6 @@
 """Systems from SymPy's expressions: a Hamiltonian, or the equations of `sympy.physics.mechanics`."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from importlib import import_module
 from typing import Any
 
@@ -21,8 +21,8 @@ FUNCTIONS = {
 @checked_arguments
 def from_sympy(
     expression: Any,
-    q: Sequence[Any] = (),
-    p: Sequence[Any] = (),
+    q: Any = (),
+    p: Any = (),
     *,
     parameters: Mapping[Any, Any] | None = None,
     t: Any = None,
@@ -35,7 +35,7 @@ def from_sympy(
     expression : sympy.Expr, or a LagrangesMethod or KanesMethod
         A Hamiltonian in the symbols ``q`` and ``p``; or a system of `sympy.physics.mechanics` whose equations
         have been formed. Their mass matrix is inverted symbolically, by ``rhs()``.
-    q, p : sequence of sympy.Symbol
+    q, p : sympy.Symbol, or sequence of them
         Positions and momenta, for a Hamiltonian.
     parameters : mapping of Symbol to float, optional
         All other symbols, with their default values; their names are those of the system's parameters.
@@ -69,6 +69,7 @@ def from_sympy(
         sympy = import_module("sympy")
     except ImportError:
         raise MissingLibraryError("sympy is not installed; install it with: pip install sympy.") from None
+    q, p = ([given] if isinstance(given, sympy.Expr) else list(given) for given in (q, p))
     values = dict(parameters or {})
     names = {symbol: str(symbol) for symbol in values}
     for text in names.values():
@@ -78,7 +79,13 @@ def from_sympy(
     defaults = {text: float(values[symbol]) for symbol, text in names.items()}
     if hasattr(expression, "rhs") and hasattr(expression, "u"):
         state = [*expression.q, *expression.u]
-        right = [sympy.sympify(component) for component in expression.rhs()]
+        try:
+            right = [sympy.sympify(component) for component in expression.rhs()]
+        except ValueError as error:
+            formed = "form_lagranges_equations()" if "Lagrange" in type(expression).__name__ else "kanes_equations()"
+            raise InputError(
+                f"the equations of this {type(expression).__name__} are not formed; call its {formed} first."
+            ) from error
         places: dict[Any, Callable[..., Any]] = {x: _component("y", i) for i, x in enumerate(state)}
         formulas = [_Formula(sympy, e, places, names, times) for e in right]
         return VectorField(

@@ -12,7 +12,7 @@ import numpy as np
 
 from integrators import registry
 from integrators.dynamics.vectors import Course, random_vectors, sampling_times
-from integrators.protocol import Array, MethodBase, Status
+from integrators.protocol import Array, MethodBase, Status, check_is_problem
 from problems.checks import at_least, checked_arguments
 from problems.errors import InputError
 from problems.problem import Problem
@@ -97,6 +97,7 @@ def megno(
     >>> bool(abs(found.value - 2.0) < 0.05)
     True
     """
+    check_is_problem(problem)
     method = registry.create("HBVM") if method is None else method
     times = sampling_times(problem, method, t_end, samples)
     course = Course(problem, method, random_vectors(problem.system.dim, 1))
@@ -140,6 +141,7 @@ def sali(
     >>> bool(sali(problems.load("henon_heiles"), Gauss(s=6, h=0.25), t_end=500.0).value < 1e-8)
     True
     """
+    check_is_problem(problem)
     t, directions, _, course = _followed(problem, method, 2, t_end, samples)
     u, v = directions[:, :, 0], directions[:, :, 1]
     values = np.minimum(np.linalg.norm(u - v, axis=1), np.linalg.norm(u + v, axis=1))
@@ -176,6 +178,7 @@ def gali(
     >>> bool(gali(problems.load("henon_heiles"), Gauss(s=6, h=0.25), k=3, t_end=500.0).value < 1e-12)
     True
     """
+    check_is_problem(problem)
     t, directions, _, course = _followed(problem, method, k, t_end, samples)
     values = np.prod(np.linalg.svd(directions, compute_uv=False), axis=1)
     return Indicator(t, values, course.status, course.reason, course.steps)
@@ -205,6 +208,7 @@ def finite_time_exponent(
     >>> round(finite_time_exponent(saddle, Gauss(s=4, h=0.1), t_end=5.0).value, 3)
     1.0
     """
+    check_is_problem(problem)
     dim = problem.system.dim
     t, directions, logarithms, course = _followed(problem, method, dim, t_end, samples)
     largest = logarithms.max(axis=1, initial=-np.inf)

@@ -18,7 +18,7 @@ import numpy as np
 from integrators import registry
 from integrators.dynamics.divergence import mean_divergence
 from integrators.dynamics.vectors import with_variations
-from integrators.protocol import Array, MethodBase, Status
+from integrators.protocol import Array, MethodBase, Status, check_is_problem
 from problems.checks import at_least, checked_arguments
 from problems.errors import InputError
 from problems.problem import Problem
@@ -149,6 +149,7 @@ def lyapunov(
     >>> found.exponents.shape, found.pairs < 1e-10
     ((4,), True)
     """
+    check_is_problem(problem)
     method = registry.create("HBVM") if method is None else method
     return exponents_of(problem, method, *checked_span(problem, count, t_end, skip), skip)
 

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from integrators import registry
 from integrators.dynamics.vectors import with_variations
-from integrators.protocol import Array, MethodBase, Status
+from integrators.protocol import Array, MethodBase, Status, check_is_problem
 from integrators.refusals import as_numbers
 from integrators.running.variations import places
 from problems import emit
@@ -141,6 +141,7 @@ def periodic(
     >>> orbit.converged, round(orbit.period, 8)
     (True, 6.19216933)
     """
+    check_is_problem(problem)
     method = registry.create("HBVM") if method is None else method
     start = problem.y0 if guess is None else as_numbers("guess", guess)
     if start.shape != problem.y0.shape or not np.isfinite(start).all():

@@ -76,6 +76,11 @@ class EventLog:
         """Why the integration has ended, as a sentence."""
         return f"the event {self.terminal!r} ended the integration at t = {self.stop!r}."
 
+    def last(self) -> tuple[float, Array]:
+        """Return when the last of all has happened, and the state after it."""
+        t, y, after, event, _ = self._pieces[-1]
+        return float(t[-1]), (after if self._acts[event[-1]] else y)[-1].copy()
+
     def occurrences(self) -> dict[str, Occurrences]:
         """Return what has happened, by the events' names."""
         t, y, after, event, direction = self._joined()
@@ -196,9 +201,10 @@ def started_with_events(
     """
     acting = [name for name, event in events.items() if event.then is not None]
     if acting and not (offers(program, Actions) and program.acts):
+        why, instead = _refused_action(program, method)
         raise InputError(
-            f"the event {acting[0]!r} changes the state, which {method!r} does not offer; use HBVM or Gauss "
-            "with an adaptive step size (tol=), or leave out then=."
+            f"the event {acting[0]!r} changes the state, which {method!r} does not offer{why}; use {instead}, "
+            "or leave out then=."
         )
     if not offers(program, Events):
         raise InputError(
@@ -206,3 +212,17 @@ def started_with_events(
             "finding them takes; use HBVM, Gauss, LineIntegral or Taylor."
         )
     return program.with_events(problem, events)
+
+
+def _refused_action(program: Any, method: MethodBase) -> tuple[str, str]:
+    """Return why events cannot change the state, and what to use instead."""
+    adaptive = "HBVM or Gauss with an adaptive step size (tol=)"
+    if offers(program, Actions):
+        conserved = ", ".join(method.conserved(program.system))
+        return (
+            f" for {program.system.name}: it conserves {conserved or 'invariants'}, which the event may change",
+            "Gauss(s=4, tol=1e-12)",
+        )
+    if getattr(method, "tol", None) is None and getattr(method, "h", None) is not None:
+        return ", as the event would shorten a step of its fixed length", adaptive
+    return "", adaptive

@@ -234,15 +234,14 @@ class DoubleDoubleStepper(RestorableStepper):
         here, size = self._present[0].real, abs(self._h)
         if ended == UNSOLVED:
             self._fail(
-                Status.NONLINEAR_DIVERGENCE, here,
+                Status.NONLINEAR_DIVERGENCE, here, y.real,
                 f"the fixed-point iteration does not converge at t = {here!r}; take a step below {size!r}.",
             )  # fmt: skip
         else:
             self._fail(
-                Status.NOT_FINITE, here,
+                Status.NOT_FINITE, here, y.real,
                 f"the stages of the step from t = {here!r} are not finite; take a step below {size!r}.",
             )  # fmt: skip
-        self._y = y.real.copy()
         return False
 
     def _one_step(self) -> tuple[float, Array] | None:

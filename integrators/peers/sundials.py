@@ -199,7 +199,7 @@ class CVODEStepper(StepperBase):
         try:
             result = self._solver.solve(np.array([start, end]), self._y)
         except UserError as raised:
-            self._broken(raised, start)
+            self._broken(raised, start, self._y)
             return np.empty(0), np.empty((0, self._y.size))
         self._note(result)
         self._stats.steps += result.t.size - 1
@@ -241,20 +241,20 @@ class CVODEStepper(StepperBase):
                     break
                 result = self._solver.step(end, "onestep", stop)
         except UserError as raised:
-            self._broken(raised, before)
+            self._broken(raised, before, self._yn)
             return False
         self._note(result)
         if self._refused(result, before):
             return False
         if result.t == before:
             self._fail(
-                Status.STEP_UNDERFLOW, before, f"CVODE's steps at t = {before!r} are too short to change t."
+                Status.STEP_UNDERFLOW, before, self._yn, f"CVODE's steps at t = {before!r} are too short to change t."
             )
             return False
         self._stats.steps += 1
         self._tn, self._yn = float(result.t), np.array(result.y, dtype=np.float64)
         if stalled := watch.update(self._tn):
-            self._fail(Status.STALLED, self._tn, stalled)
+            self._fail(Status.STALLED, self._tn, self._yn, stalled)
         return not stalled
 
     def _note(self, result: Any) -> None:
@@ -264,9 +264,9 @@ class CVODEStepper(StepperBase):
     def _refused(self, result: Any, t: float) -> bool:
         if result.success:
             return False
-        self._fail(Status.STEP_UNDERFLOW, t, f"CVODE gave up at t = {t!r}: {result.message}")
+        self._fail(Status.STEP_UNDERFLOW, t, self._yn, f"CVODE gave up at t = {t!r}: {result.message}")
         return True
 
-    def _broken(self, raised: UserError, t: float) -> None:
+    def _broken(self, raised: UserError, t: float, y: Array) -> None:
         self.error = raised.error
-        self._fail(Status.USER_ERROR, t, f"{raised} in the step from t = {t!r}.")
+        self._fail(Status.USER_ERROR, t, y, f"{raised} in the step from t = {t!r}.")

@@ -279,7 +279,7 @@ def integrate(
         method=method,
         error=error,
     )
-    return _with_events(solution, stepper.search) if wanted else solution
+    return _with_events(solution, stepper.search, keeps=grid.size > 0) if wanted else solution
 
 
 def _lost(problem: Problem, method: MethodBase, samples: Samples, steps: int) -> Losses:
@@ -371,13 +371,20 @@ def _growth(seconds: float) -> float:
     return 4.0 if seconds < SOON / 4.0 else 0.5 if seconds > 2.0 * SOON else 1.0
 
 
-def _with_events(solution: Solution, search: Finder) -> Solution:
-    """Return the solution with what a search for events has found, up to where it ended."""
+def _with_events(solution: Solution, search: Finder, *, keeps: bool) -> Solution:
+    """Return the solution with what a search for events has found, up to where it ended.
+
+    A terminal event before all samples leaves its own state, if one is to be kept.
+    """
     end = Ending.from_search(search, solution.status, solution.reason, solution.problem.t0, solution.t_stop)
     n = end.count(solution.t, search)
+    t, y = solution.t[:n], solution.y[:n]
+    if keeps and not n and end.status is Status.EVENT and solution.variations is None:
+        stop, last = search.hits.last()
+        t, y = np.array([stop]), last[np.newaxis]
     stats = replace(solution.stats, extra={**solution.stats.extra, "event_search": search.work()})
     return replace(
-        solution, t=solution.t[:n], y=solution.y[:n], status=end.status, reason=end.reason, t_stop=end.stop,
+        solution, t=t, y=y, status=end.status, reason=end.reason, t_stop=end.stop,
         stats=stats, events=search.hits.occurrences(), error=end.error or solution.error,
         variations=None if solution.variations is None else solution.variations[:n],
     )  # fmt: skip

@@ -32,7 +32,9 @@ from integrators.running.integrate import SECONDS
 from integrators.running.pieces import (
     Gathered,
     Remote,
+    Search,
     digest,
+    find_in_piece,
     in_batches,
     integrate_piece,
     integrate_with,
@@ -112,8 +114,9 @@ def integrate_many(
         each.
     reduce : mapping of str to Reduction, optional
         Reductions to compute in place of the states, by name: see `integrators.reduce`. Only the last states
-        are stored. The last digits of a mean depend on ``piece``; the results do not depend on threads or
-        workers.
+        are stored. With times of their own a reduction over trajectories takes the first of each
+        trajectory's times together, the second, and so on; with events the samples until a terminal one. The
+        last digits of a mean depend on ``piece``; the results do not depend on threads or workers.
     variations : array_like, shape (dim, k) or (n, dim, k), or str, or sequence of str, optional
         As for `integrate`, at the start of each trajectory, or tangent vectors of each: ``variations`` of
         the result has the shape (n, m, dim, k). Trajectories are then integrated one after another, or one in
@@ -121,7 +124,8 @@ def integrate_many(
     executor : concurrent.futures.Executor, optional
         Executor that runs the integrations: a ``ProcessPoolExecutor``,
         ``dask.distributed.Client().get_executor()``, ... A piece whose worker dies is submitted once more; if
-        that fails, its trajectories have the status ``INTERRUPTED``.
+        that fails, its trajectories have the status ``INTERRUPTED``. The functions of events are sent by
+        name, so they must be those of a module.
     piece : int, optional
         Number of trajectories that are integrated together. Default: with ``executor`` a 64th of all, between
         1 and 4096; with ``reduce`` as many as have 2**22 numbers.
@@ -205,10 +209,11 @@ def integrate_many(
 
     if executor is not None:
         pieces = [
-            (numbers, (*given(numbers), problem.t0, threads, sample, along(numbers)))
+            (numbers, (*given(numbers), problem.t0, threads, *(() if start else (sample, along(numbers)))))
             for numbers in gathered.missing(cast("int", size))
         ]
-        pieces_ = Remote(executor, problem, method, integrate_piece).run(pieces)
+        task = (find_in_piece, Search(problem, method, looked_for)) if start else (integrate_piece,)
+        pieces_ = Remote(executor, problem, method, *task).run(pieces)
     else:
         batches = start is None and directions is None and in_batches(program, grid, sample)
         few = program.piece if offers(program, PieceSize) else FIRST * threads
@@ -239,18 +244,24 @@ def _check_together(
     problems.errors.InputError
         With the name of what to leave out.
     """
-    for name, given in (("sample", sample), ("executor", executor)):
-        if given is not None and (backend is not None or events):
-            other = "backend" if backend is not None else "events"
+    for name, given, others in (
+        ("sample", sample, {"backend": backend is not None, "events": bool(events)}),
+        ("executor", executor, {"backend": backend is not None}),
+    ):
+        if given is not None and any(others.values()):
+            other = next(other for other, is_given in others.items() if is_given)
             raise InputError(f"{name}= and {other}= do not go together; leave one of them out.")
     if events and backend is not None:
         raise InputError(f"events are not looked for with backend={backend!r}; leave it out.")
     if backend is not None and grid.ndim == 2:
         raise InputError("backend='jax' takes times of shape (m,), the same for all.")
-    if reduce and (sample == "steps" or events or grid.ndim == 2):
-        raise InputError(
-            "reduce= needs times of shape (m,), the same for all; leave out events and sample='steps'."
-        )
+    if sample == "steps":
+        for name, reduction in reduce.items():
+            if isinstance(reduction, Reduction) and reduction.over != "times":
+                raise InputError(
+                    f"reduce={{{name!r}: ...}} over trajectories needs as many states of each, which "
+                    "sample='steps' has not; give it over='times', or leave out sample=."
+                )
 
 
 def _times(problem: Problem, times: ArrayLike | None, n: int) -> Array:

@@ -4,16 +4,19 @@ import hashlib
 import pickle
 import threading
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
-from functools import lru_cache
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from integrators.ensemble import Solutions
-from integrators.events.members import own_times
+from integrators.events.event import Event
+from integrators.events.finder import started_with_events
+from integrators.events.members import follow, own_times
 from integrators.protocol import (
     Array,
     Batches,
@@ -195,6 +198,29 @@ def integrate_piece(problem: Problem, method: MethodBase, *piece: Any) -> Trajec
     return integrate_with(prepared(method, problem.system)[0], *piece)
 
 
+@dataclass(eq=False)
+class Search:
+    """What a worker looks for; the functions are compiled once, where the first piece arrives."""
+
+    problem: Problem
+    method: MethodBase
+    events: Mapping[str, Event]
+
+    @cached_property
+    def start(self) -> Callable[..., Any]:
+        """What starts a trajectory that looks for the events."""
+        program = prepared(self.method, self.problem.system)[0]
+        return started_with_events(program, self.method, self.problem, self.events)
+
+
+def find_in_piece(
+    problem: Problem, method: MethodBase, search: Search, *piece: Any
+) -> tuple[Trajectories, list[dict[str, Occurrences]]]:
+    """Integrate some trajectories in a worker and look for their events: starts, par, times, t0, threads."""
+    members = follow(search.start, *piece)
+    return joined([item for item, _ in members], piece[2]), [happened for _, happened in members]
+
+
 class Gathered:
     """What is known of the trajectories of an ensemble.
 
@@ -221,9 +247,14 @@ class Gathered:
         n = len(starts)
         self._problem, self._method, self._starts, self._par = problem, method, starts, par
         self._times, self._reducer, self._directions = times, reducer, directions
-        width = 0 if sample == "steps" else times.shape[-1] if reducer is None else 1
+        width = 1 if reducer is not None else 0 if sample == "steps" else times.shape[-1]
         nothing: tuple[Array, Array] = np.empty(0), np.empty((0, starts.shape[1]))
-        self._rows = [nothing] * n if sample == "steps" else None
+        self._rows = [nothing] * n if sample == "steps" and reducer is None else None
+        self._same = times.ndim == 1 and sample != "steps"  # whether all have the same times
+        self._last = np.full(n, np.nan)  # the last time of each, where their states are reduced
+        if reducer is not None and sample != "steps":
+            rows = np.broadcast_to(times, (n, times.shape[-1]))
+            self._last = rows[np.arange(n), np.isfinite(rows).sum(axis=1) - 1]
         self._y = np.full((n, width, starts.shape[1]), np.nan)
         self._variations: Array | None = None
         if directions is not None:
@@ -262,8 +293,7 @@ class Gathered:
             return
         chosen = numbers.tolist()
         if self._reducer is not None:
-            self._reducer.take(numbers, result.t, result.y, self._par[numbers])
-            self._y[numbers] = result.y[:, -1:]
+            self._reduce(self._reducer, numbers, result.t, result.y)
         elif self._rows is not None:
             for i, t, y in zip(chosen, np.broadcast_to(result.t, result.y.shape[:2]), result.y, strict=True):
                 there = ~np.isnan(t)
@@ -278,6 +308,18 @@ class Gathered:
         self._extra.update({chosen[i]: extra for i, extra in result.extra.items() if extra})
         self._events.update(zip(chosen, events or (), strict=False))
 
+    def _reduce(self, reducer: Reducer, numbers: Numbers, t: Array, y: Array) -> None:
+        """Take the states of some trajectories, and keep the last one of each."""
+        t = np.broadcast_to(t, y.shape[:2])
+        missing = self._times.shape[-1] - t.shape[1] if self._times.ndim == 2 else 0
+        if missing > 0:  # each of these has fewer times than others
+            t = np.pad(t, ((0, 0), (0, missing)), constant_values=np.nan)
+            y = np.pad(y, ((0, 0), (0, missing), (0, 0)), constant_values=np.nan)
+        reducer.take(numbers, t, y, self._par[numbers])
+        some = np.flatnonzero(np.isfinite(t).any(axis=1))
+        last = np.isfinite(t[some]).sum(axis=1) - 1
+        self._y[numbers[some], 0], self._last[numbers[some]] = y[some, last], t[some, last]
+
     _kept = ("_rows", "_y", "_variations", "_status", "_reason", "_stop", "_steps", "_extra", "_events")
 
     def checkpoint(self) -> dict[str, Any]:
@@ -285,6 +327,7 @@ class Gathered:
         known = {name: getattr(self, name) for name in self._kept}
         if self._reducer is not None:
             known["reduced"] = self._reducer.gathered, self._reducer.numbers
+            known["last"] = self._last
         return known
 
     def restore(self, known: dict[str, Any]) -> None:
@@ -293,6 +336,7 @@ class Gathered:
             setattr(self, name, known[name])
         if self._reducer is not None:
             self._reducer.gathered, self._reducer.numbers = known["reduced"]
+            self._last = known.get("last", self._last)
 
     def solutions(self, compile_seconds: float, from_cache: bool | None, *, events: bool) -> Solutions:
         """Return what is known."""
@@ -303,7 +347,7 @@ class Gathered:
             for i, (row, states) in enumerate(self._rows):
                 t[i, : row.size], y[i, : row.size] = row, states
         elif self._reducer is not None:
-            t = t[..., -1:]
+            t = t[-1:] if self._same else self._last[:, np.newaxis]
         return Solutions(
             t=t, y=y, status=self._status, reason=self._reason, t_stop=self._stop, steps=self._steps,
             starts=self._starts, par=self._par, compile_seconds=compile_seconds, from_cache=from_cache,
@@ -324,7 +368,10 @@ class Remote:
     problem, method
         What is integrated, and how; they are sent to the workers.
     task : callable
-        ``task(problem, method, *piece)`` returns the trajectories of a piece; importable by the workers.
+        ``task(problem, method, *more, *piece)`` returns the trajectories of a piece, or them and what happened
+        in each; importable by the workers.
+    more
+        What else every piece needs.
 
     Raises
     ------
@@ -332,7 +379,9 @@ class Remote:
         For what is no executor, and a problem that cannot be sent.
     """
 
-    def __init__(self, executor: Executor, problem: Problem, method: MethodBase, task: Callable[..., Any]):
+    def __init__(
+        self, executor: Executor, problem: Problem, method: MethodBase, task: Callable[..., Any], *more: Any
+    ):
         if not callable(getattr(executor, "submit", None)):
             raise InputError(
                 f"executor={shown(executor)} is none; give one as concurrent.futures has, such as "
@@ -340,12 +389,13 @@ class Remote:
             )
         self._executor, self._task = executor, task
         try:
-            self._sent = pickle.dumps((problem, method))
+            self._sent = pickle.dumps((problem, method, *more))
         except Exception as error:
-            raise InputError(f"{problem!s} cannot be sent to workers: {shown(str(error))}.") from None
+            what = f"{problem!s} with its events, which must be functions of a module," if more else problem
+            raise InputError(f"{what!s} cannot be sent to workers: {shown(str(error))}.") from None
 
-    def run(self, pieces: list[tuple[Numbers, tuple[Any, ...]]]) -> Iterator[tuple[Numbers, Any, None]]:
-        """Yield of each piece its numbers and trajectories, in order; or a text on why there are none.
+    def run(self, pieces: list[tuple[Numbers, tuple[Any, ...]]]) -> Iterator[tuple[Numbers, Any, Any]]:
+        """Yield of each piece its numbers, trajectories and events, in order; or a text on why there are none.
 
         A piece whose worker dies is sent again, once. After an executor is broken nothing is sent.
         """
@@ -358,7 +408,8 @@ class Remote:
                 if not waiting:
                     return
                 numbers, piece, future = waiting.popleft()
-                yield numbers, self._result(piece, future), None
+                result = self._result(piece, future)
+                yield (numbers, *result) if isinstance(result, tuple) else (numbers, result, None)
         finally:
             for *_, future in waiting:
                 if isinstance(future, Future) or hasattr(future, "cancel"):
@@ -391,7 +442,7 @@ def _at_worker(task: Callable[..., Any], sent: bytes, piece: tuple[Any, ...]) ->
 
 
 @lru_cache(maxsize=4)
-def _received(sent: bytes) -> tuple[Problem, MethodBase]:
+def _received(sent: bytes) -> tuple[Any, ...]:
     """Return what was sent: the same objects for every piece, so that a program is prepared once."""
     return pickle.loads(sent)
 

@@ -96,6 +96,8 @@ class Run:
         self._par = problem.par
         self._before: list[Mapping[str, Occurrences]] = []
         self._shown: tuple[float, Array] | None = None
+        self._terminates = any(event.last for event in self._wanted.values())
+        self._over = False  # whether a terminal event has happened in the step ahead
         digits = start is not None or method.precision != "double"
         if digits:
             check_digits(method, events=bool(self._wanted), variations=False)
@@ -120,17 +122,24 @@ class Run:
         if self._wanted:
             self._before.append(self._stepper.search.hits.occurrences())
         self._begin(y, t)
-        self._shown = None
+        self._shown, self._over = None, False
+
+    @property
+    def _present(self) -> tuple[float, Array]:
+        """The time and the state: after a terminal event its own, which lies within a step."""
+        if self.status is Status.EVENT:
+            return self._stepper.search.hits.last()
+        return self._shown or (self._stepper.t, self._stepper.y)
 
     @property
     def t(self) -> float:
-        """The current time."""
-        return self._stepper.t if self._shown is None else self._shown[0]
+        """The current time; after a terminal event its time."""
+        return self._present[0]
 
     @property
     def y(self) -> Array:
         """The current state, shape (dim,), q then p; it can be set as a whole."""
-        return _frozen(self._stepper.y if self._shown is None else self._shown[1])
+        return _frozen(self._present[1], "y = run.y.copy(), then run.y = y")
 
     @y.setter
     def y(self, state: ArrayLike) -> None:
@@ -158,7 +167,7 @@ class Run:
         ((4,), (4, 2), (4,))
         """
         self._check_digits()
-        return _frozen(self._stepper.pairs)
+        return _frozen(self._stepper.pairs, "run.pairs = ...")
 
     @pairs.setter
     def pairs(self, state: Any) -> None:
@@ -181,7 +190,7 @@ class Run:
     @property
     def par(self) -> Array:
         """The parameters, shape (n_par,), as `System.pack` has them; they can be set, by name too."""
-        return _frozen(self._par)
+        return _frozen(self._par, 'run.par = {"name": value}')
 
     @par.setter
     def par(self, values: ArrayLike | Mapping[str, Any]) -> None:
@@ -195,12 +204,12 @@ class Run:
     @property
     def status(self) -> Status:
         """Status: ``RUNNING``, ``EVENT`` after a terminal event, or the kind of failure."""
-        return self._stepper.status
+        return Status.EVENT if self._over else self._stepper.status
 
     @property
     def reason(self) -> str:
-        """One sentence on a failure; empty otherwise."""
-        return self._stepper.reason
+        """One sentence on a failure or a terminal event; empty otherwise."""
+        return self._stepper.search.hits.reason if self._over else self._stepper.reason
 
     @property
     def events(self) -> dict[str, Occurrences]:
@@ -227,17 +236,17 @@ class Run:
 
         After `until` it is the remainder of the step that contains that time.
         """
-        if self._stepper.status is Status.RUNNING:
+        if self.status is Status.RUNNING:
             self._stepper.step()
             self._shown = None
-        return self._stepper.status
+        return self.status
 
     def until(self, t: float) -> Array:
         """Integrate to a time, forward or backward, and return the state there.
 
         The method's steps do not depend on it: the state is that of `integrate` at this time, and the next
-        step ends where it would have ended without the call. If the method fails before, `status` and
-        `reason` describe the failure, and the time and the state are those that were reached.
+        step ends where it would have ended without the call. If the method fails before, or a terminal event
+        happens, `status` and `reason` describe it, and the time and the state are those that were reached.
 
         Parameters
         ----------
@@ -254,10 +263,21 @@ class Run:
             If ``t`` is not a finite number.
         """
         (goal,) = check_times([t], self.t).tolist()
-        if self._stepper.status is Status.RUNNING and goal != self.t:
+        if self.status is Status.RUNNING and goal != self.t:
             samples = self._stepper.advance(np.array([goal]))
             self._shown = (goal, samples.y[0]) if samples.t.size else None
+            if self._terminates and self._stepper.status is Status.RUNNING:
+                self._look_to(goal)
         return self.y
+
+    def _look_to(self, goal: float) -> None:
+        """Look whether a terminal event lies in the part of the step ahead that ends at ``goal``."""
+        search = self._stepper.search
+        kept = search.save()
+        self._stepper.look_to(goal)
+        self._over = search.hits.terminal is not None
+        if not self._over and search.trouble is None:
+            search.load(kept)  # the step is looked at as a whole when it is taken
 
     def energy(self) -> float:
         """Return the energy of the current state, with the current parameters.
@@ -274,11 +294,31 @@ class Run:
         return float(values["energy"][0])
 
     def __repr__(self) -> str:
-        return f"Run({self.problem!r}, {self.method!r}, {self.status} at t = {self.t!r})"
+        return f"Run({self.problem!s}, {self.method!r}, {self.status} at t = {self.t!r})"
 
 
-def _frozen(array: Array) -> Array:
-    """Return a copy that cannot be written to: what is written to it would change nothing."""
-    copy = array.copy()
+class _Whole(np.ndarray):
+    """A copy of what can be set as a whole only: what was written into it would change nothing."""
+
+    setting = ""
+
+    def __setitem__(self, key: Any, value: Any) -> None:
+        if not self.setting:
+            return super().__setitem__(key, value)
+        raise InputError(f"its parts are read-only; set the whole: {self.setting}.")
+
+    def __array_finalize__(self, obj: Any) -> None:
+        self.setting = ""  # what is calculated from it is an array like others
+
+    def __getitem__(self, key: Any) -> Any:
+        if isinstance(key, str) and self.setting:
+            raise InputError(f"{key!r} is no index of it; system.unpack(run.par)[{key!r}] is the parameter.")
+        return super().__getitem__(key)
+
+
+def _frozen(array: Array, setting: str) -> Array:
+    """Return a copy that refuses to be written to, and says how to set the whole."""
+    copy = array.copy().view(_Whole)
+    copy.setting = setting
     copy.flags.writeable = False
     return copy

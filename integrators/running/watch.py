@@ -154,7 +154,7 @@ def identity(
     """Return what a checkpoint belongs to, by name, as texts."""
     start = np.concatenate([[problem.t0], problem.y0 if begin is None else begin.ravel()])
     return {
-        "problem": repr(problem),
+        "problem": problem.written(),
         "system": emit.fingerprint(problem.system),
         "start": hashlib.sha256(start.tobytes()).hexdigest(),
         "parameters": hashlib.sha256(problem.par.tobytes()).hexdigest(),

@@ -14,7 +14,7 @@ rule does not apply to the method. `check_method` runs them all;
 
 from collections.abc import Callable
 
-from integrators.protocol import MethodBase
+from integrators.protocol import MethodBase, check_is_problem
 from integrators.testing.capabilities import (
     a_destination_leaves_the_samples_alone,
     adjoints_are_what_tangents_say,
@@ -120,6 +120,7 @@ def check_method(method: MethodBase, problem: Problem) -> dict[str, str | None]:
     AssertionError
         At the first broken rule.
     """
+    check_is_problem(problem)
     return {name_of(check): check(method, problem) for check in CHECKS}
 
 

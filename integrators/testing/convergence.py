@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from integrators.protocol import MethodBase
+from integrators.protocol import MethodBase, check_is_problem
 from integrators.running.integrate import integrate
 from problems import Problem
 
@@ -53,6 +53,7 @@ def measured_order(
     AssertionError
         If fewer than three errors lie between rounding and ``asymptotic``.
     """
+    check_is_problem(problem)
     end = problem.t_end if end is None else end
     goal = integrate(problem, None, [end]).y[-1] if exact is None else np.asarray(exact)
     points: list[tuple[float, float]] = []

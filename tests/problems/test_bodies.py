@@ -1,5 +1,6 @@
 """Bodies with forces between them, and what else acts on them."""
 
+import mpmath
 import numpy as np
 import pytest
 
@@ -108,6 +109,65 @@ def test_relativity_conserves_what_it_should():
     assert max(error.max() for error in errors.values()) < 1e-12  # measured 6e-15
 
 
+def _post_newtonian(masses: list[float], x: np.ndarray, v: np.ndarray, c: float) -> np.ndarray:
+    """Return the accelerations of Einstein, Infeld and Hoffmann with 40 digits, written as in the books."""
+    with mpmath.workdps(40):
+        mu = [mpmath.mpf(mass) for mass in masses]
+        x, v = (np.vectorize(mpmath.mpf, otypes=[object])(rows) for rows in (x, v))
+        n = len(mu)
+        r = {(a, b): mpmath.sqrt(sum((x[a] - x[b]) ** 2)) for a in range(n) for b in range(n) if a != b}
+        others = {a: [b for b in range(n) if b != a] for a in range(n)}
+        newton = [sum(mu[b] * (x[b] - x[a]) / r[a, b] ** 3 for b in others[a]) for a in range(n)]
+        made = []
+        for a in range(n):
+            total = newton[a]
+            for b in others[a]:
+                normal = (x[a] - x[b]) / r[a, b]
+                bracket = (
+                    v[a] @ v[a] + 2 * (v[b] @ v[b]) - 4 * (v[a] @ v[b]) - 3 * (normal @ v[b]) ** 2 / 2
+                    - 4 * sum(mu[k] / r[a, k] for k in others[a])
+                    - sum(mu[k] / r[b, k] for k in others[b])
+                    + (x[b] - x[a]) @ newton[b] / 2
+                )  # fmt: skip
+                added = (
+                    -mu[b] * normal / r[a, b] ** 2 * bracket
+                    + mu[b] / r[a, b] ** 2 * (normal @ (4 * v[a] - 3 * v[b])) * (v[a] - v[b])
+                    + mpmath.mpf(7) / 2 * mu[b] * newton[b] / r[a, b]
+                )
+                total = total + added / mpmath.mpf(c) ** 2
+            made.append([float(component) for component in total])
+    return np.array(made)
+
+
+def test_relativity_of_massless_bodies_is_the_one_of_einstein_infeld_and_hoffmann():
+    bodies = nbody(MASSES[:2], X, V, massless=2, forces=[PostNewtonian(c=3.0)], t_end=1.0)
+    assert bodies.system.dof is None
+    wanted = _post_newtonian([*MASSES[:2], 0.0, 0.0], X, V, 3.0)
+    assert _accelerations(bodies, 4) == pytest.approx(wanted, rel=1e-13, abs=1e-14)  # measured 2e-15
+    newton = nbody(MASSES[:2], X, V, massless=2, t_end=1.0)
+    assert np.abs(_accelerations(newton, 4) - wanted).max() > 0.01
+
+
+def test_relativity_and_a_function_act_together():
+    drag = lambda v: [[-0.1 * u for u in row] for row in v]  # noqa: E731
+    bodies = nbody(MASSES, X, V, forces=[PostNewtonian(c=3.0), drag], t_end=1.0)
+    wanted = _post_newtonian(MASSES, X, V, 3.0) - 0.1 * V
+    assert _accelerations(bodies, 4) == pytest.approx(wanted, rel=1e-13, abs=1e-14)  # measured 2e-15
+
+
+def test_both_forms_of_relativity_differ_by_the_fourth_power_of_the_velocity_of_light():
+    nothing = lambda x: [[0.0, 0.0, 0.0] for _ in x]  # noqa: E731 -- makes it a VectorField
+    apart = []
+    for c in (20.0, 40.0):
+        energy, field = (
+            nbody(MASSES, X, V, forces=[PostNewtonian(c=c), *more], t_end=1.0) for more in ((), (nothing,))
+        )
+        q, y = integrate(energy, HBVM(), [1.0]).q, integrate(field, HBVM(), [1.0]).y
+        apart.append(np.abs(q[-1] - y[-1, :12]).max())
+    assert 12.0 < apart[0] / apart[1] < 20.0  # 16, the next order in 1/c^2
+    assert apart[1] < 1e-4
+
+
 def test_a_force_of_ones_own():
     drag = lambda t, x, v, masses, m: [[-0.1 * u for u in row] for row in v]  # noqa: E731
     falling = nbody([1e-30], [[0.0] * 3, X[0]], [[0.0] * 3, V[0]], massless=1, forces=[drag], t_end=5.0)
@@ -126,7 +186,7 @@ def test_a_force_of_ones_own():
         ({"forces": [J2(J2=1.0, R=1.0, body=4)]}, "none of the 4 bodies"),
         ({"forces": [lambda w: w]}, "no argument 'w'"),
         ({"forces": [lambda x: x[:2]]}, "three accelerations for each of the 4 bodies"),
-        ({"forces": [PostNewtonian(c=1.0), lambda x: x]}, "small mass"),
+        ({"forces": [PostNewtonian(c=1.0), lambda x: x], "softening": 0.1}, "no relativistic form"),
         ({"G": "big"}, "G='big'"),
     ],
 )

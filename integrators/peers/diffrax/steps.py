@@ -183,10 +183,13 @@ class AdaptiveStepper(RestorableStepper):
             self._fail(
                 Status.STEP_UNDERFLOW,
                 reached,
+                np.asarray(y),
                 f"diffrax's step fell below {solve.ULPS:g} ulp at t = {reached!r}.",
             )
         elif code == solve.OTHER:
-            self._fail(Status.NOT_FINITE, reached, f"diffrax ended without success at t = {reached!r}.")
+            self._fail(
+                Status.NOT_FINITE, reached, np.asarray(y), f"diffrax ended without success at t = {reached!r}."
+            )
         return reached, np.asarray(y), code
 
     def _count(self, accepted: int, rejected: int) -> None:
@@ -230,7 +233,7 @@ class AdaptiveStepper(RestorableStepper):
         while code == self._program.solve.LIMIT and t != end:
             t, y, code = self._advance(t, y, end, CRAWL_STEPS)
             if code == self._program.solve.LIMIT and (stalled := watch.update(t, CRAWL_STEPS)):
-                self._fail(Status.STALLED, t, stalled)
+                self._fail(Status.STALLED, t, y, stalled)
             if self._status.failed:
                 return t, y
         return end, y

@@ -70,11 +70,11 @@ class TaylorSearch:
         self._hits = EventLog(events, 1.0 if end >= t else -1.0, y.size)
         self._ahead: list[tuple[float, Array, int, int]] = []
         self._counts = [0] * len(events)
-        self._finished = False
+        self._finished: float | None = None
         self.terminates = any(event.last for event in self._events)
         """Whether one of them is terminal."""
-        self.over = False
-        """Whether a terminal event has happened."""
+        self.over: float | None = None
+        """When a terminal event has happened, which may be ahead of the present."""
 
     def watch(self, integrator: Any) -> None:
         """Hear of the events of an integrator."""
@@ -90,7 +90,8 @@ class TaylorSearch:
         integrator.update_d_output(t)
         self._ahead.append((t, integrator.d_output.copy(), event, way))
         self._counts[event] += 1
-        self.over = self.over or self._counts[event] == self._events[event].last
+        if self.over is None and self._counts[event] == self._events[event].last:
+            self.over = t
 
     def take_back(self, t: float) -> None:
         """Forget what happened after a time, from which a step is taken again."""
@@ -99,20 +100,21 @@ class TaylorSearch:
             kept -= 1
         for hit in self._ahead[kept:]:
             self._counts[hit[2]] -= 1
+            self.over = None
         del self._ahead[kept:]
 
-    def finish(self) -> None:
-        """Let all count that has happened up to the end."""
-        self._finished = True
+    def finish(self, end: float) -> None:
+        """Let all count that has happened up to a time, also ahead of the present."""
+        self._finished = end
 
     @property
     def hits(self) -> EventLog:
         """What has happened up to the present."""
         now, self._ahead = self._ahead, []
-        if not (self._finished or self.over):
-            ahead = [self._hits.sign * (hit[0] - self._present()) > 0.0 for hit in now]
-            self._ahead = list(compress(now, ahead))
-            now = list(compress(now, [not is_ahead for is_ahead in ahead]))
+        known = self._present() if self._finished is None else self._finished
+        ahead = [self._hits.sign * (hit[0] - known) > 0.0 for hit in now]
+        self._ahead = list(compress(now, ahead))
+        now = list(compress(now, [not is_ahead for is_ahead in ahead]))
         if now:
             t, y, event, direction = (np.array(column) for column in zip(*now, strict=True))
             self._hits.take(t, y, y, event, direction)
@@ -130,3 +132,4 @@ class TaylorSearch:
         """Go on from where `save` was called."""
         self._hits.load(kept["hits"])
         self._ahead, self._counts = list(kept["ahead"]), list(kept["counts"])
+        self._finished = None

@@ -285,16 +285,20 @@ class TaylorStepper(RestorableStepper):
     def look_to(self, end: float) -> Status:
         """Keep the events up to a time in the step ahead too."""
         if self.search is not None and self._status is Status.RUNNING:
-            self._serve(np.array([end]), "partial")
-            self.search.finish()
+            if end != self._t:
+                self._serve(np.array([end]), "partial")
+            self.search.finish(end)
         return self._status
 
-    def _ends(self) -> bool:
-        """Whether a terminal event has happened, which ends the integration."""
-        if self.search is None or not self.search.over:
+    def _ends(self, t: float | None = None) -> bool:
+        """Whether a terminal event has happened, before ``t``: it ends the integration."""
+        if self.search is None or self.search.over is None:
             return False
+        if t is not None and self._sign * (t - self.search.over) <= 0.0:
+            return False
+        self.search.finish(self.search.over)
         hits = self.search.hits
-        self._fail(Status.EVENT, hits.stop, hits.reason)
+        self._fail(Status.EVENT, *hits.last(), hits.reason)
         return True
 
     def _place(self, t: float, y: Array) -> None:
@@ -313,7 +317,7 @@ class TaylorStepper(RestorableStepper):
     def _step_states(self, end: float) -> tuple[Array, Array]:
         sign = self._towards(end)
         times, states = [self._t], [self._y]
-        while self._ta.time != times[-1] or self._step() is not None:
+        while not self._ends() and (self._ta.time != times[-1] or self._step() is not None):
             if sign * (self._ta.time - end) > 0.0:
                 break
             times.append(self._ta.time)
@@ -321,7 +325,7 @@ class TaylorStepper(RestorableStepper):
         return np.array(times[1:]), np.array(states)[1:]
 
     def _one_step(self) -> tuple[float, Array] | None:
-        if self._ta.time == self._t and self._step() is None:
+        if self._ends() or (self._ta.time == self._t and self._step() is None):
             return None
         return self._ta.time, self._ta.state
 
@@ -333,14 +337,17 @@ class TaylorStepper(RestorableStepper):
         self._sign = sign
         return sign
 
-    def _step(self) -> float | None:
-        """Take one step and return its length, or note the failure and return ``None``."""
+    def _step(self, goal: float | None = None) -> float | None:
+        """Take one step and return its length, or note the failure and return ``None``.
+
+        A terminal event in it is such a failure, unless it comes after the ``goal``.
+        """
         t = self._ta.time
         outcome, h = (self._ta.step if self._sign > 0.0 else self._ta.step_backward)(write_tc=True)
         if outcome == self._outcome.success:
             self._stats.steps, self._stepped = self._stats.steps + 1, True
-            return None if self._ends() else abs(h)
-        self._broken(t)
+            return None if self._ends(goal) else abs(h)
+        self._broken(t, self._ta.tc[:, 0])
         return None
 
     def _step_to(self, t: float, *, write_tc: bool = False) -> bool:
@@ -357,9 +364,12 @@ class TaylorStepper(RestorableStepper):
             if outcome == self._outcome.time_limit:
                 return True
             if outcome == self._outcome.err_nf_state:
-                self._broken(self._ta.time if np.isfinite(self._ta.time) else before)
+                if not write_tc:  # the coefficients have the state before the step that failed
+                    self._place(self._t, self._y)
+                    self._ta.propagate_until(t, write_tc=True)
+                self._broken(self._ta.time if np.isfinite(self._ta.time) else before, self._ta.tc[:, 0])
             elif stalled := watch.update(self._ta.time, steps):
-                self._fail(Status.STALLED, self._ta.time, stalled)
+                self._fail(Status.STALLED, self._ta.time, self._ta.state, stalled)
             if self._status is not Status.RUNNING:
                 return False
 
@@ -371,12 +381,14 @@ class TaylorStepper(RestorableStepper):
         (`propagate_grid` will not do: it forgets the low part of heyoka's clock.)
         """
         ta = self._ta
+        if self._ends(t):
+            return False
         while sign * (ta.time - t) < 0.0:
             if not self._stepped or abs(t - ta.time) > NEAR * abs(ta.last_h):  # else last_h is another's
                 if not self._step_to(t, write_tc=True):
                     return False
                 self._take_back()
-            if self._step() is None:
+            if self._step(t) is None:
                 return False
         return True
 
@@ -394,8 +406,8 @@ class TaylorStepper(RestorableStepper):
             self.search.take_back(ta.time)
         self._stats.extra["side_steps"] += 1
 
-    def _broken(self, t: float) -> None:
-        self._fail(Status.NOT_FINITE, t, f"heyoka met a state that is not finite in the step from t = {t!r}.")
+    def _broken(self, t: float, y: Array) -> None:
+        self._fail(Status.NOT_FINITE, t, y, f"heyoka met a state that is not finite in the step from t = {t!r}.")
 
     def _save(self) -> Any:
         return copy.copy(self._ta), self._sign, self._stepped

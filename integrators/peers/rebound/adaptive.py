@@ -52,7 +52,7 @@ class AdaptiveStepper(StepperBase):
         try:
             call(argument)
         except (RuntimeError, self._program.rebound.GenericError) as error:
-            self._fail(Status.NOT_FINITE, float(simulation.t), f"REBOUND gave up: {error}")
+            self._ended(Status.NOT_FINITE, f"REBOUND gave up: {error}")
         self._stats.steps += int(simulation.steps_done) - before
         self._stats.evaluations = int(self._block.values[self._program.hooks.EVALUATIONS])
         self._stats.extra.update(self._method.counts(simulation))
@@ -70,13 +70,17 @@ class AdaptiveStepper(StepperBase):
         stopped = "; ".join(filter(None, ("stopped by the watchdog", self._method.remedy)))
         if values[hooks.REASON] == hooks.NAN:
             t = t if math.isfinite(t) else self._t
-            self._fail(Status.NOT_FINITE, t, f"{name}'s time or step was no longer finite after t = {t!r}.")
+            self._ended(Status.NOT_FINITE, f"{name}'s time or step was no longer finite after t = {t!r}.")
         elif values[hooks.REASON] == hooks.STANDS:
             still = f"time stood still at t = {t!r} for {hooks.FROZEN} steps"
-            self._fail(Status.STALLED, t, f"{fell} {still}; {stopped}.")
+            self._ended(Status.STALLED, f"{fell} {still}; {stopped}.")
         else:
             still = f"{CRAWL_STEPS} steps came no nearer to t = {end!r} than t = {t!r}"
-            self._fail(Status.STALLED, t, f"{fell} {still}; {stopped}.")
+            self._ended(Status.STALLED, f"{fell} {still}; {stopped}.")
+
+    def _ended(self, status: Status, reason: str) -> None:
+        simulation = self._simulation
+        self._fail(status, float(simulation.t), self._program.state(self._layout, simulation), reason)
 
     def _towards(self, end: float) -> float:
         simulation = self._simulation

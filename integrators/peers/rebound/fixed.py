@@ -68,6 +68,8 @@ class Leapfrog(FixedMethod):
 class ReboundStepper(FixedStepper):
     """A trajectory with fixed steps; see `integrators.stepping.FixedStepper` for the sampling."""
 
+    marks = False
+
     def __init__(self, program: ReboundProgram, layout: Layout, y: Array, t: float):
         super().__init__(program, y, layout.par, t)
         self._layout = layout

@@ -164,7 +164,7 @@ class SciPyStepper(StepperBase):
             try:
                 states[i] = self._solver.y if self._solver.t == t else self._aside(t)
             except UserError as raised:
-                self._broken(raised, float(self._solver.t_old))
+                self._broken(raised, float(self._solver.t_old), self._solver.y_old)
                 return grid[:i], states[:i]
             if not np.isfinite(states[i]).all():
                 return grid[: i + 1], states[: i + 1]
@@ -204,22 +204,22 @@ class SciPyStepper(StepperBase):
         try:
             message = solver.step()
         except UserError as raised:
-            self._broken(raised, before)
+            self._broken(raised, before, solver.y)
             return False
         self._note("jacobians", solver.njev - jacobians)
         self._note("factorizations", solver.nlu - factored)
         if solver.status == "failed":
-            self._fail(Status.STEP_UNDERFLOW, before, f"SciPy gave up at t = {before!r}: {message}")
+            self._fail(Status.STEP_UNDERFLOW, before, solver.y, f"SciPy gave up at t = {before!r}: {message}")
             return False
         stats.steps += 1
         stalled = watch.update(float(solver.t))
         if stalled:
-            self._fail(Status.STALLED, float(solver.t), stalled)
+            self._fail(Status.STALLED, float(solver.t), solver.y, stalled)
         return not stalled
 
-    def _broken(self, raised: UserError, t: float) -> None:
+    def _broken(self, raised: UserError, t: float, y: Array) -> None:
         self.error = raised.error
-        self._fail(Status.USER_ERROR, t, f"{raised} in the step from t = {t!r}.")
+        self._fail(Status.USER_ERROR, t, y, f"{raised} in the step from t = {t!r}.")
 
     def _aside(self, t: float) -> Array:
         """Return the state at ``t``, within the last step."""

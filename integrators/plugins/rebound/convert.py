@@ -6,7 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from integrators.protocol import check_is_problem
 from integrators.refusals import check_state
+from integrators.solution import Solution
 from problems import emit
 from problems.bodies import nbody
 from problems.checks import checked_arguments
@@ -84,14 +86,14 @@ def from_rebound(simulation: Any, *, t_end: float, forces: Sequence[Any] = ()) -
 
 @checked_arguments
 def to_rebound(
-    problem: Problem, y: ArrayLike | None = None, *, t: float | None = None, simulation: Any = None
+    problem: Problem | Solution, y: ArrayLike | None = None, *, t: float | None = None, simulation: Any = None
 ) -> Any:
     """Return a simulation with the bodies of a problem in a state.
 
     Parameters
     ----------
-    problem : Problem
-        From `problems.nbody` or `from_rebound`, or any with bodies in space.
+    problem : Problem or Solution
+        From `problems.nbody` or `from_rebound`, or any with bodies in space. Of a solution, its last state.
     y : array_like, shape (dim,), optional
         The state: a row of ``solution.y``; by default the problem's start.
     t : float, optional
@@ -115,6 +117,14 @@ def to_rebound(
     6
     """
     from integrators.peers import load
+
+    if isinstance(problem, Solution):
+        if y is not None or t is not None:
+            raise InputError("to_rebound(solution) takes its last state; for another give its problem, y= and t=.")
+        if not problem.t.size:
+            raise InputError(f"the solution has no state: it ended at t = {problem.t_stop!r}, {problem.reason}")
+        problem, y, t = problem.problem, problem.y[-1], float(problem.t[-1])
+    check_is_problem(problem)
 
     system = problem.system
     state = problem.y0 if y is None else check_state(y, system.dim)
