@@ -53,9 +53,10 @@ class Event(CheckedOptions):
         True: the integration ends at the first occurrence; a number n: at the n-th.
     then : callable, optional
         What happens to the state: a function of the same arguments, at the time of the event, that returns
-        the new state, a list of dim numbers (q then p): a bounce, a kick, a merging. It is traced once and
-        compiled, or else called with numbers, which costs some 30 µs. The integration goes on from there.
-        For the adaptive steps of `HBVM` and `Gauss`.
+        the new state, a list of dim numbers (q then p): a bounce, a kick, a merging. To change parameters it
+        returns a tuple ``(state, {"name": value, ...})``, with ``None`` for a state that stays. It is traced
+        once and compiled, or else called with numbers, which costs some 30 µs. The integration goes on from
+        there; fixed steps are counted from there. For `HBVM` and `Gauss`.
     name : str, optional
         What it is called in the solution; the function's own name by default.
 
@@ -70,6 +71,7 @@ class Event(CheckedOptions):
     >>> Event(lambda q: q[0], direction=1)
     Event(g=<function ...>, direction=1, terminal=False, then=None, name=None)
     >>> bounce = Event(lambda q: q[0], direction=-1, then=lambda q, p: [q[0], -0.9 * p[0]])
+    >>> burnt = Event(lambda t: t - 9.0, then=lambda: (None, {"thrust": 0.0}))
     """
 
     _owner: ClassVar[str | None] = "an event"
