@@ -21,6 +21,7 @@ from integrators.plain import (
     unpacked_method,
 )
 from integrators.protocol import Array, MethodBase, Stats, Status, Trajectories
+from integrators.segments import Segments
 from integrators.solution import Occurrences, Solution, library, of_type, write_whole
 from problems.analysis import invariants
 from problems.checks import File, checked_arguments, readable
@@ -204,24 +205,39 @@ class Solutions(Trajectories):
 
     def invariants(self) -> dict[str, Array]:
         """Return the invariants, shape (n, m), or (n, m, k) of a vector, by name."""
-        return self._gathered(
-            [
-                invariants.invariants(self.problem.system, par, y, t)
-                for par, y, t in zip(self.par, self.y, self._times, strict=True)
-            ]
-        )
+        system = self.problem.system
+
+        def values(i: int, segments: Segments) -> dict[str, Array]:
+            def along(k: int, t: Array, y: Array) -> dict[str, Array]:
+                return invariants.invariants(system, segments.par[k], y, t)
+
+            return segments.gathered(self._times[i], self.y[i], along)
+
+        return self._gathered([values(i, segments) for i, segments in enumerate(self._segments())])
 
     def errors(self) -> dict[str, Array]:
         """Return the deviation of each invariant from its initial value, shape (n, m), by name.
 
-        As `problems.Problem.errors`; NaN at times that a trajectory did not reach.
+        As `problems.Problem.errors`; NaN at times that a trajectory did not reach. After an event that changes
+        the state they are relative to the state after it, as in `Solution.errors`.
         """
-        return self._gathered(
-            [
-                invariants.errors(self.problem.system, par, y, t, start=(self.problem.t0, start))
-                for par, y, t, start in zip(self.par, self.y, self._times, self.starts, strict=True)
-            ]
-        )
+        system = self.problem.system
+
+        def values(i: int, segments: Segments) -> dict[str, Array]:
+            def errors(k: int, t: Array, y: Array) -> dict[str, Array]:
+                start = float(segments.t[k]), segments.y[k]
+                return invariants.errors(system, segments.par[k], y, t, start=start)
+
+            return segments.gathered(self._times[i], self.y[i], errors)
+
+        return self._gathered([values(i, segments) for i, segments in enumerate(self._segments())])
+
+    def _segments(self) -> Iterator[Segments]:
+        """Return the segments of each trajectory between events that change the state or the parameters."""
+        t0 = self.problem.t0
+        for i, (start, par) in enumerate(zip(self.starts, self.par, strict=True)):
+            events = self.events[i] if self.events else {}
+            yield Segments.from_events(t0, start, par, events, 1.0 if self.t_stop[i] >= t0 else -1.0)
 
     def _gathered(self, members: list[dict[str, Array]]) -> dict[str, Array]:
         return {name: np.stack([member[name] for member in members]) for name in members[0]}
@@ -336,7 +352,7 @@ class Solutions(Trajectories):
             lengths = np.array([0 if hits is None else len(hits) for hits in occurrences], dtype=np.int64)
             arrays[f"event_counts:{name}"] = lengths
             acts = any(hits is not None and hits.after is not None for hits in occurrences)
-            for key in ("t", "y", "direction", *(["after"] if acts else [])):
+            for key in ("t", "y", "direction", *(["after", "par"] if acts else [])):
                 parts = [getattr(hits, key) for hits in occurrences if hits is not None]
                 arrays[f"event_{key}:{name}"] = np.concatenate(parts)
         if self.variations is not None and self.directions is not None:
@@ -416,7 +432,7 @@ def _from_file(words: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]], pro
         from_cache=None if words["from_cache"] is None else of_type(bool, words["from_cache"]),
         problem=problem,
         method=unpacked_method(words["method"], arrays),
-        events=[] if words["events"] is None else _events(words["events"], arrays, n, dim),
+        events=[] if words["events"] is None else _events(words["events"], arrays, n, problem),
         reduced={name: _numbers(arrays[f"reduced:{of_type(str, name)}"]) for name in words["reduced"]},
         extra=extra,
         **_variations(arrays, (n, m, dim, problem.system.n_par)),
@@ -444,20 +460,20 @@ def _numbers(values: NDArray[Any]) -> NDArray[Any]:
 
 
 def _events(
-    names: list[str], arrays: Mapping[str, NDArray[Any]], n: int, dim: int
+    names: list[str], arrays: Mapping[str, NDArray[Any]], n: int, problem: Problem
 ) -> list[dict[str, Occurrences]]:
     events: list[dict[str, Occurrences]] = [{} for _ in range(n)]
     for name in names:
         counts = arrays[f"event_counts:{name}"]
         if counts.dtype.kind != "i" or counts.shape != (n,) or counts.min(initial=0) < 0:
             raise TypeError(f"the counts of {shown(name)} are not as many as the trajectories")
-        whole = solution.occurrences(name, arrays, dim)
+        whole = solution.occurrences(name, arrays, problem)
         if counts.sum() != len(whole):
             raise TypeError(f"the times of {shown(name)} are not as many as its counts")
         ends = np.cumsum(counts)
         for i, (low, high) in enumerate(zip(ends - counts, ends, strict=True)):
-            after = None if whole.after is None else whole.after[low:high]
+            changed = (None if rows is None else rows[low:high] for rows in (whole.after, whole.par))
             events[i][name] = Occurrences(
-                whole.t[low:high], whole.y[low:high], whole.direction[low:high], after
+                whole.t[low:high], whole.y[low:high], whole.direction[low:high], *changed
             )
     return events

@@ -26,6 +26,7 @@ from integrators.plain import (
 )
 from integrators.protocol import Array, DoubleDouble, MethodBase, Program, Stats, Status
 from integrators.refusals import as_numbers
+from integrators.segments import Segments
 from problems.analysis import invariants
 from problems.checks import File, checked_arguments, readable
 from problems.double_double import DD
@@ -52,12 +53,15 @@ class Occurrences:
         1 where g increases, -1 where it decreases, 0 where it touches zero without a change of sign.
     after : ndarray, shape (n, dim), optional
         The states after the event's action; ``None`` for an event without one.
+    par : ndarray, shape (n, n_par), optional
+        The parameters from then on, as `System.unpack` takes them; ``None`` for an event without an action.
     """
 
     t: Array
     y: Array
     direction: NDArray[np.int64]
     after: Array | None = None
+    par: Array | None = None
 
     def __len__(self) -> int:
         return self.t.size
@@ -226,6 +230,8 @@ class Solution:
             states = np.concatenate([states, np.concatenate([first, self.low])], axis=1)
         end = float(at[-1])
         at, states = self._with_actions(at, states)
+        segments = self._segments
+        segment = segments.places(at, states[:, :dim])
         if not self.status.failed and (self.t_stop - end) * (end - self.problem.t0) >= 0.0:
             end = self.t_stop  # a terminal event, after the last sample
         sign = 1.0 if end >= self.problem.t0 else -1.0
@@ -253,7 +259,7 @@ class Solution:
             reached = states[:0]
             if goals.size:
                 start = float(at[group[0]])
-                stepper = self._begun(states[group[0]], start)
+                stepper = self._begun(states[group[0]], start, segments.par[segment[group[0]]])
                 if self.directions is not None:
                     stepper.follow(states[group[0], dim:].reshape(dim, -1), self.directions[1])
                 advanced = stepper.advance(sign * goals)
@@ -272,6 +278,7 @@ class Solution:
             met = (np.abs((reached[np.searchsorted(goals, ends)] - states[group])[:, :dim]) <= close).all(
                 axis=1
             )
+            met &= segment[group] == segment[group[0]]
             done = group.size if met.all() else int(np.argmin(met))
             mine = mine[sample[mine] <= group[done - 1]]
             states_[mine] = reached[np.searchsorted(goals, wanted[mine])]
@@ -281,13 +288,13 @@ class Solution:
         states_[own] = states[sample[own]]
         return states_[places.reshape(times.shape)]
 
-    def _begun(self, row: Array, t: float) -> Any:
+    def _begun(self, row: Array, t: float, par: Array) -> Any:
         """Return a stepper at a state, which may have low parts behind it."""
         dim, program = self.problem.system.dim, self._program
         if self.low is None:
-            return program.start(row[:dim], self.problem.par, t)
+            return program.start(row[:dim], par, t)
         pairs = np.stack([row[:dim], row[dim:]], axis=1)
-        return cast("DoubleDouble", program).start_pairs(pairs, self.problem.par, t)
+        return cast("DoubleDouble", program).start_pairs(pairs, par, t)
 
     def _with_actions(self, at: Array, states: Array) -> tuple[Array, Array]:
         """Return samples, and the states that events' actions have made in between, in order."""
@@ -304,6 +311,17 @@ class Solution:
         )
         _, places = np.unique(sign * t, return_index=True)
         return t[places], y[places]
+
+    @property
+    def _acted(self) -> bool:
+        """Whether an event has changed the state or the parameters."""
+        return any(happened.after is not None and happened.t.size for happened in self.events.values())
+
+    @property
+    def _segments(self) -> Segments:
+        """The segments between events that change the state or the parameters."""
+        problem, sign = self.problem, 1.0 if self.t_stop >= self.problem.t0 else -1.0
+        return Segments.from_events(problem.t0, problem.y0, problem.par, self.events, sign)
 
     @cached_property
     def _program(self) -> Program:
@@ -327,7 +345,15 @@ class Solution:
     @property
     def v(self) -> Array | None:
         """Velocities (n, dof) of a Lagrangian, or a Hamiltonian with constant masses, else ``None``."""
-        return self.problem.velocity(self.y, self.t)
+        problem = self.problem
+        if not self._acted or problem.velocity(self.y[:0], self.t[:0]) is None:
+            return problem.velocity(self.y, self.t)
+        segments = self._segments
+
+        def velocity(k: int, t: Array, y: Array) -> dict[str, Any]:
+            return {"v": invariants.velocity(problem.system, segments.par[k], y, t)}
+
+        return segments.gathered(self.t, self.y, velocity)["v"]
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -349,15 +375,33 @@ class Solution:
         return said + of_losses(lost)
 
     def invariants(self) -> dict[str, Array]:
-        """Return the problem's invariants along the trajectory, by name."""
-        return self.problem.invariants(self.y, self.t)
+        """Return the problem's invariants along the trajectory, by name, with the parameters of each time."""
+        if not self._acted:
+            return self.problem.invariants(self.y, self.t)
+        system, segments = self.problem.system, self._segments
+        return segments.gathered(
+            self.t, self.y, lambda k, t, y: invariants.invariants(system, segments.par[k], y, t)
+        )
 
     def errors(self) -> dict[str, Array]:
-        """Return the errors of the invariants along the trajectory, relative where that has a meaning."""
+        """Return the errors of the invariants along the trajectory, relative where that has a meaning.
+
+        They are those of the integration: after an event that changes the state or the parameters
+        (``Event(then=...)``) each invariant is compared with what it is right after that event, and not with
+        the start. How much the events have changed it is in `invariants`.
+        """
         return self._errors(slice(None))
 
     def _errors(self, which: Any) -> dict[str, Array]:
         problem = self.problem
+        if self._acted:
+            segments = self._segments
+
+            def errors(k: int, t: Array, y: Array) -> dict[str, Array]:
+                start = float(segments.t[k]), segments.y[k]
+                return invariants.errors(problem.system, segments.par[k], y, t, start=start)
+
+            return segments.gathered(self.t[which], self.y[which], errors)
         if self.low is None or self.start is None:
             return problem.errors(self.y[which], self.t[which])
         states, begin = DD(self.y[which], self.low[which]), (problem.t0, DD(*self.start.T))
@@ -444,6 +488,7 @@ class Solution:
         errors = self._errors(places)
         largest = ", ".join(f"{name} {float(error.max()):.1e}" for name, error in errors.items())
         where = f" at {places.size} of the states" if every > 1 else ""
+        where += " since the last event that changes the state" if self._acted else ""
         return [f"largest errors{where}: {largest}"] if errors else []
 
     def to_pandas(self) -> Any:
@@ -590,7 +635,7 @@ def from_file(words: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]], prob
         stats=_stats(unpacked(words["stats"], arrays)),
         problem=problem,
         method=unpacked_method(words["method"], arrays),
-        events={name: occurrences(name, arrays, dim) for name in words["events"]},
+        events={name: occurrences(name, arrays, problem) for name in words["events"]},
         variations=_variations(arrays, n, dim),
         directions=_directions(arrays, dim, problem.par.size),
         **_digits(arrays, n, dim),
@@ -633,16 +678,18 @@ def check_extra(extra: Any) -> None:
     of_type(int, extra.get("implicit", {"steps": 0})["steps"])
 
 
-def occurrences(name: str, arrays: Mapping[str, NDArray[Any]], dim: int) -> Occurrences:
+def occurrences(name: str, arrays: Mapping[str, NDArray[Any]], problem: Problem) -> Occurrences:
     """Return where an event happened, from the arrays of a file."""
+    dim, n_par = problem.system.dim, problem.system.n_par
     t, y, direction = (arrays[f"event_{key}:{of_type(str, name)}"] for key in ("t", "y", "direction"))
     if direction.dtype.kind != "i" or direction.shape != t.shape:
         raise TypeError(f"the directions of {shown(name)} are not as many as its times")
     n = np.size(t)
-    after = arrays.get(f"event_after:{name}")
+    after, par = arrays.get(f"event_after:{name}"), arrays.get(f"event_par:{name}")
     return Occurrences(
         doubles(t, (n,), "t"), doubles(y, (n, dim), "y"), direction.astype(np.int64),
         None if after is None else doubles(after, (n, dim), "after"),
+        None if par is None else doubles(par, (n, n_par), "par"),
     )  # fmt: skip
 
 

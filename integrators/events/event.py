@@ -52,9 +52,10 @@ class Event(CheckedOptions):
         True: the integration ends at the first occurrence; a number n: at the n-th.
     then : callable, optional
         Action of the event: a function of the same arguments that returns the new state, a list of dim
-        numbers (q then p), such as a bounce, a kick or a merger. It is traced once and compiled, or else
-        called with numbers, which takes some 30 µs. The integration continues from the new state. For the
-        adaptive steps of `HBVM` and `Gauss`.
+        numbers (q then p), such as a bounce, a kick or a merger. To change parameters it returns a tuple
+        ``(state, {"name": value, ...})``, with ``None`` for an unchanged state. It is traced once and
+        compiled, or else called with numbers, which takes some 30 µs. The integration continues from the new
+        state; fixed steps are counted from there. For `HBVM` and `Gauss`.
     name : str, optional
         Name of the event in the solution; that of the function by default.
 
@@ -69,6 +70,7 @@ class Event(CheckedOptions):
     >>> Event(lambda q: q[0], direction=1)
     Event(g=<function ...>, direction=1, terminal=False, then=None, name=None)
     >>> bounce = Event(lambda q: q[0], direction=-1, then=lambda q, p: [q[0], -0.9 * p[0]])
+    >>> burnt = Event(lambda t: t - 9.0, then=lambda: (None, {"thrust": 0.0}))
     """
 
     _owner: ClassVar[str | None] = "an event"

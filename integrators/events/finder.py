@@ -14,6 +14,8 @@ from problems.errors import InputError
 from problems.problem import Problem
 
 Failure = tuple[Status, str, Exception | None]
+_Piece = tuple[Any, ...]  # times, states before and after, events, directions, parameters after
+PARTS = 6  # of such a piece
 
 
 class EventLog:
@@ -27,6 +29,8 @@ class EventLog:
         The direction of time.
     dim : int
         Length of the state.
+    parameters : int
+        Length of the parameter vector.
 
     Attributes
     ----------
@@ -40,21 +44,23 @@ class EventLog:
         When.
     """
 
-    def __init__(self, events: Mapping[str, Event], sign: float, dim: int):
-        self.names, self.sign, self._dim = list(events), sign, dim
+    def __init__(self, events: Mapping[str, Event], sign: float, dim: int, parameters: int = 0):
+        self.names, self.sign, self._widths = list(events), sign, (dim, parameters)
         self._limits = [event.last for event in events.values()]
         self._acts = [event.then is not None for event in events.values()]
-        self._pieces: list[tuple[Array, Array, Array, NDArray[np.int64], NDArray[np.int64]]] = []
+        self._pieces: list[_Piece] = []
         self.counts = [0] * len(self.names)
         self.terminal: str | None = None
         self.stop = float("nan")
 
     def take(
-        self, t: Array, y: Array, after: Array, event: NDArray[np.int64], direction: NDArray[np.int64]
-    ) -> None:
+        self, t: Array, y: Array, after: Array, event: NDArray[np.int64], direction: NDArray[np.int64],
+        par: Array | None = None,
+    ) -> None:  # fmt: skip
         """Take what has happened since the last time; what was after a terminal event has not.
 
-        States are those before and ``after`` an event's action, the same where it has none.
+        States are those before and ``after`` an event's action, the same where it has none; ``par`` are the
+        parameters after it.
         """
         order = np.argsort(self.sign * t, kind="stable")
         if self.terminal is not None:
@@ -69,7 +75,9 @@ class EventLog:
         if self.terminal is not None:
             self.stop = float(t[order[-1]])
         if order.size:
-            self._pieces.append((t[order], y[order], after[order], event[order], direction[order]))
+            par = np.empty((t.size, self._widths[1])) if par is None else par
+            rows = (t, y, after, event, direction, par)
+            self._pieces.append(tuple(row[order] for row in rows))
 
     @property
     def reason(self) -> str:
@@ -78,24 +86,23 @@ class EventLog:
 
     def last(self) -> tuple[float, Array]:
         """Return when the last of all has happened, and the state after it."""
-        t, y, after, event, _ = self._pieces[-1]
+        t, y, after, event, _, _ = self._pieces[-1]
         return float(t[-1]), (after if self._acts[event[-1]] else y)[-1].copy()
 
     def occurrences(self) -> dict[str, Occurrences]:
         """Return what has happened, by the events' names."""
-        t, y, after, event, direction = self._joined()
+        t, y, after, event, direction, par = self._joined()
         result = {}
         for i, name in enumerate(self.names):
             own = event == i
-            after_ = after[own] if self._acts[i] else None
-            result[name] = Occurrences(t[own], y[own], direction[own], after_)
+            changes = (after[own], par[own]) if self._acts[i] else ()
+            result[name] = Occurrences(t[own], y[own], direction[own], *changes)
         return result
 
-    def _joined(self) -> tuple[Array, Array, Array, NDArray[np.int64], NDArray[np.int64]]:
-        none, nowhere = np.empty(0, dtype=np.int64), np.empty((0, self._dim))
-        pieces = [*self._pieces, (np.empty(0), nowhere, nowhere, none, none)]
-        t, y, after, event, direction = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
-        return t, y, after, event, direction
+    def _joined(self) -> "_Piece":
+        none, nowhere, no_par = np.empty(0, dtype=np.int64), *(np.empty((0, n)) for n in self._widths)
+        pieces = [*self._pieces, (np.empty(0), nowhere, nowhere, none, none, no_par)]
+        return tuple(np.concatenate(parts) for parts in zip(*pieces, strict=True))
 
     def save(self) -> dict[str, Any]:
         """Return everything, for `load`."""
@@ -104,7 +111,18 @@ class EventLog:
         return {"pieces": joined, "counts": list(self.counts), "terminal": self.terminal, "stop": self.stop}
 
     def load(self, kept: Mapping[str, Any]) -> None:
-        """Go on from what `save` returned."""
+        """Go on from what `save` returned.
+
+        Raises
+        ------
+        problems.errors.InputError
+            If an earlier version returned it.
+        """
+        if len(kept["pieces"]) != PARTS:
+            raise InputError(
+                "this checkpoint is of another version of hbvm-bench, which knows less of events; restore it "
+                "with that version, or begin anew."
+            )
         self._pieces, self.counts = [kept["pieces"]], list(kept["counts"])
         self.terminal, self.stop = kept["terminal"], kept["stop"]
 
@@ -201,10 +219,9 @@ def started_with_events(
     """
     acting = [name for name, event in events.items() if event.then is not None]
     if acting and not (offers(program, Actions) and program.acts):
-        why, instead = _refused_action(program, method)
         raise InputError(
-            f"the event {acting[0]!r} changes the state, which {method!r} does not offer{why}; use {instead}, "
-            "or leave out then=."
+            f"the event {acting[0]!r} changes the state, which {method!r} does not offer"
+            f"{_refused_action(program, method)}; use HBVM or Gauss, or leave out then=."
         )
     if not offers(program, Events):
         raise InputError(
@@ -214,15 +231,9 @@ def started_with_events(
     return program.with_events(problem, events)
 
 
-def _refused_action(program: Any, method: MethodBase) -> tuple[str, str]:
-    """Return why events cannot change the state, and what to use instead."""
-    adaptive = "HBVM or Gauss with an adaptive step size (tol=)"
-    if offers(program, Actions):
-        conserved = ", ".join(method.conserved(program.system))
-        return (
-            f" for {program.system.name}: it conserves {conserved or 'invariants'}, which the event may change",
-            "Gauss(s=4, tol=1e-12)",
-        )
-    if getattr(method, "tol", None) is None and getattr(method, "h", None) is not None:
-        return ", as the event would shorten a step of its fixed length", adaptive
-    return "", adaptive
+def _refused_action(program: Any, method: MethodBase) -> str:
+    """Return why events cannot change the state, if there is more to say."""
+    if not offers(program, Actions):
+        return ""
+    conserved = ", ".join(method.conserved(program.system))
+    return f" for {program.system.name}: it conserves {conserved or 'invariants'}, which the event may change"

@@ -1,20 +1,26 @@
 """A trajectory with fixed step size."""
 
+from time import perf_counter
+
 import numpy as np
 from numpy.typing import ArrayLike
 
-from integrators.kernel.context import DENSE, DONE, PARTIAL, STOP
+from integrators.kernel.context import ANEW, BUDGET, DENSE, DONE, PARTIAL, STOP
 from integrators.kernel.native import engine
 from integrators.kernel.stepper import HBVMStepper
 from integrators.protocol import Array, Samples, Status
 from integrators.refusals import check_state, one_thread
-from integrators.running.times import Counts, plan
+from integrators.running.times import plan
+
+MOST = 1 << 60  # steps or samples
+FEW, GROWTH = 64, 4  # of them that are planned at a time after an event, and how these become more
 
 
 class FixedStepper(HBVMStepper):
     """A trajectory of HBVM(k, s) with fixed step size; see `HBVMStepper`.
 
-    The present time is ``t0 + n h`` with an integer n, never an accumulated sum.
+    The present time is ``t0 + n h`` with an integer n, never an accumulated sum. An event that changes the
+    state is where the steps are counted from: ``t0`` is its time.
     """
 
     @one_thread
@@ -33,7 +39,9 @@ class FixedStepper(HBVMStepper):
             self._set_step(self._program.h)
         self._begin(start, t0)
         self._status, self._reason, self.error = Status.RUNNING, "", None
-        return self._make(STOP, np.array([t]), np.zeros(1, dtype=np.int64), np.array([t - t0]))
+        times = np.array([t])
+        states, outcome, why = self._fill(STOP, times, np.zeros(1, dtype=np.int64), times - t0)
+        return self._samples(times[: len(states)], states, outcome, why)
 
     def _one_step(self) -> bool:
         (numbers, _, place, out), ctx = self._room, self._context
@@ -49,37 +57,80 @@ class FixedStepper(HBVMStepper):
     @one_thread
     def take(self, count: int) -> Samples:
         """Take ``count`` steps and return them."""
-        ctx = self._context
-        targets = ctx.n + np.arange(1, count + 1)
-        times = np.asarray(ctx.t0 + targets * ctx.h, dtype=np.float64)
-        return self._make(PARTIAL, times, targets, np.zeros(count))
+        return self._steps(self._context.n + 1, None, count)
 
     @one_thread
     def march(self, end: float, most: int) -> Samples:
         """Take steps, ``most`` at most and none beyond the time ``end``; return them."""
-        ctx = self._context
-        if (end - self.t) * ctx.h < 0.0:
+        if (end - self.t) * self._context.h < 0.0:
             self._turn(self.t)
-        targets, _ = plan(np.array([end]), np.array([ctx.t0]), ctx.h)
-        return self.take(min(most, int(targets[0]) - ctx.n))
+        return self._steps(self._context.n + 1, end, most)
 
     def _advance(self, grid: Array, sample: str) -> Samples:
-        ctx = self._context
-        t0, n, h = ctx.t0, ctx.n, ctx.h
-        turn = (grid[-1] - self.t) * h < 0.0
-        if turn:  # steps are counted from here
-            t0, n, h = self.t, 0, -h
-        between = {"stop": STOP, "dense": DENSE}.get(sample, PARTIAL)
-        bases = np.full(grid.size, t0)
-        if sample == "stop":
-            bases[1:] = grid[:-1]
-        targets, parts = plan(grid, bases, h)
+        if (grid[-1] - self.t) * self._context.h < 0.0:  # steps are counted from here
+            self._turn(self.t)
         if sample == "steps":
-            targets = np.arange(n + (grid[0] != self.t), targets[-1] + 1)
-            grid, parts = t0 + targets * h, np.zeros(targets.size)
-        if turn:
-            self._turn(t0)
-        return self._make(between, grid, targets, parts)
+            return self._steps(self._context.n + int(grid[0] != self.t), float(grid[-1]))
+        return self._to(grid, {"stop": STOP, "dense": DENSE}.get(sample, PARTIAL))
+
+    def _to(self, grid: Array, between: int) -> Samples:
+        """Make the samples at some times; steps are counted from each event that changes the state."""
+        ctx, pieces, done, outcome, why = self._context, [], 0, ANEW, None
+        size, late = self._first_piece, perf_counter() + self.time_limit
+        while outcome == ANEW or (outcome == DONE and done < grid.size):
+            if done and perf_counter() > late:
+                outcome = BUDGET
+                break
+            piece = grid[done : done + size]
+            bases = np.full(piece.size, ctx.t0)
+            if between == STOP:
+                bases[1:] = piece[:-1]
+            states, outcome, why = self._fill(between, piece, *plan(piece, bases, ctx.h))
+            pieces.append(states)
+            done += len(states)
+            size = FEW if outcome == ANEW else GROWTH * size
+        states = pieces[0] if len(pieces) == 1 else np.concatenate(pieces)
+        return self._samples(grid[:done], states, outcome, why)
+
+    def _steps(self, first: int, end: float | None, most: int = MOST) -> Samples:
+        """Take steps from number ``first`` on, ``most`` at most and none beyond ``end``; return them.
+
+        An event that changes the state ends a step; the next has the number 1.
+        """
+        ctx, times, states = self._context, [], []
+        size, outcome, why, over = self._first_piece, DONE, None, False
+        while not over:
+            final, rest = first + most - 1, 0.0
+            if end is not None:
+                (count,), (part,) = plan(np.array([end]), np.array([ctx.t0]), ctx.h)
+                final, rest = (int(count), part) if count < final else (final, 0.0)
+            last = min(final, first + size - 1)
+            targets = np.arange(first, last + 1)
+            t: Array = np.asarray(ctx.t0 + targets * ctx.h, dtype=np.float64)
+            parts = np.zeros(targets.size)
+            between, at = PARTIAL, t
+            if end is not None and ctx.events.act and rest and last == final:
+                # What is left of the time is looked at for events that change the state; the sample is none.
+                between, at = DENSE, np.append(t, end)
+                targets, parts = np.append(targets, last), np.append(parts, rest)
+            made, outcome, why = self._fill(between, at, targets, parts)
+            times.append(t[: len(made)])
+            states.append(made[: t.size])
+            most -= len(states[-1])
+            if outcome == ANEW:
+                times.append(np.array([ctx.t0]))
+                states.append(ctx.read()[np.newaxis])
+                first, most, size = 1, most - 1, FEW
+            else:
+                first, size, over = last + 1, GROWTH * size, outcome != DONE or last == final
+        if len(times) == 1:
+            return self._samples(times[0], states[0], outcome, why)
+        return self._samples(np.concatenate(times), np.concatenate(states), outcome, why)
+
+    @property
+    def _first_piece(self) -> int:
+        """How many samples or steps are planned at first: few where an event may change the plan."""
+        return FEW if self._context.events.act else MOST
 
     def _turn(self, t0: float) -> None:
         """Reverse the direction, here, at time ``t0``; what lay ahead lies behind and is forgotten."""
@@ -87,8 +138,3 @@ class FixedStepper(HBVMStepper):
         ctx.t0, ctx.n = t0, 0
         self._set_step(-ctx.h)
         self._forget()
-
-    def _make(self, between: int, times: Array, targets: Counts, parts: Array) -> Samples:
-        """Make the samples that are ``parts`` beyond the steps number ``targets``."""
-        states, outcome, why = self._fill(between, times, targets, parts)
-        return self._samples(times[: len(states)], states, outcome, why)

@@ -193,6 +193,11 @@ class HBVMProgram(Compiled):
         return True
 
     @property
+    def acts(self) -> bool:
+        """Whether an event may change the state: no invariants of the start are kept that it would change."""
+        return self.kept is None or not self.kept.names
+
+    @property
     def lanes(self) -> bool:
         """Whether the vector field runs on all stages at once, or on one after another."""
         return self.field.note == fields.ON_LANES
@@ -364,6 +369,11 @@ class HBVMProgram(Compiled):
 
     def _put(self, own: Context, partial: Context, par: Array) -> None:
         """Put parameters, and what follows from them, into fresh memory."""
+        self.renew(own, partial, par)
+        own.h, own.implicit.strategy = self.h, self.solver.strategy
+
+    def renew(self, own: Context, partial: Context, par: Array) -> None:
+        """Put parameters and the velocities by momentum that they make into the memory of a trajectory."""
         for context in (own, partial):
             context.par[:] = par
         if self.second:
@@ -374,7 +384,6 @@ class HBVMProgram(Compiled):
                     context.blocks.speed[:],
                     context.blocks.mass[:],
                 ) = velocity, speed, mass
-        own.h, own.implicit.strategy = self.h, self.solver.strategy
 
     def begin(self, pair: Pair, y: Array, par: Array, t0: float) -> None:
         """Put what a trajectory from (t0, y) begins with besides into its memory."""
@@ -511,11 +520,6 @@ class AdaptiveProgram(HBVMProgram):
         self.from_cache = self.from_cache and native.from_cache
         return native
 
-    @property
-    def acts(self) -> bool:
-        """Whether an event may change the state: nothing is conserved that it would change."""
-        return self.kept is None
-
     def _sizes(self, atol: float | Sequence[float] | None) -> Array:
         """Return an absolute tolerance as sizes that ``tol`` is relative to, one for each block."""
         shape = self.shape
@@ -634,6 +638,11 @@ class ReversibleProgram(AdaptiveProgram):
         context = super()._new_context(partial=partial)
         context.solver.log_rest = LOG_REST
         return context
+
+    def renew(self, own: Context, partial: Context, par: Array) -> None:
+        """Put parameters, and what follows from them, into the memory of a trajectory."""
+        super().renew(own, partial, par)
+        own.pace.par[:-1] = par
 
     def begin(self, pair: Pair, y: Array, par: Array, t0: float) -> None:
         """Put what a trajectory from (t0, y) begins with besides into its memory."""

@@ -10,7 +10,7 @@ from integrators.kernel.context import DONE
 from integrators.kernel.events.engine import look
 from integrators.kernel.events.functions import Action, EventFunction
 from integrators.kernel.events.memory import START
-from integrators.kernel.events.search import HITS, NUMBERS, KernelSearch
+from integrators.kernel.events.search import KernelSearch
 from integrators.kernel.spare import Pair, Searched, Spare
 from integrators.protocol import UserError
 
@@ -53,8 +53,8 @@ class LastingSearch(KernelSearch):
         memory.hits = memory.evaluations = memory.iterations = memory.partial_steps = 0
         for name in FRESH:
             getattr(memory, name)[:] = 0
-        self._hits = Hits(events, memory.sign, self._dim)
-        self._make_room(max(8, min(HITS, NUMBERS // self._dim)))
+        self._hits = Hits(events, memory.sign, self._dim, memory.parameters)
+        self._make_room(self._first_room)
         if self._look(START) != DONE:
             error = self._error
             raise UserError(error) from error

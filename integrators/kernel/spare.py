@@ -43,6 +43,10 @@ class Pair:
         """Take what both hold for what a trajectory with these parameters begins with."""
         self.par, self._content = par, (self.own.content(), self.partial.content())
 
+    def forget(self) -> None:
+        """Keep nothing: the parameters in the memory are no longer those of the trajectory's start."""
+        self.par = self._content = None
+
     def renew(self) -> bool:
         """Let both hold what a trajectory with ``par`` begins with; False if nothing is kept."""
         if self._content is None:

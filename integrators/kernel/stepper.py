@@ -17,11 +17,13 @@ from integrators.events.event import Event
 from integrators.kernel.adjoint.gradient import Adjoint, Records
 from integrators.kernel.context import (
     ACCUMULATE,
+    ANEW,
     BUDGET,
     DONE,
     HALTED,
     NOT_FINITE,
     NOT_KEPT,
+    RENEW,
     SCATTERED,
     Context,
 )
@@ -80,6 +82,7 @@ class Program(Protocol):
 
     def pair(self, par: Array) -> Pair: ...
     def begin(self, pair: Pair, y: Array, par: Array, t0: float) -> None: ...
+    def renew(self, own: Context, partial: Context, par: Array) -> None: ...
     def scaled(self, h: float) -> dict[str, Array]: ...
     def implicit(self) -> Workspace: ...
 
@@ -97,6 +100,7 @@ class Checkpoint:
     reason: str
     vectors: tuple[Any, ...] | None = None  # what `Vectors.save` returned
     stages: Array | None = None  # of the step ahead, which may be solved, where steps are recorded
+    par: Array | None = None  # the present parameters, which events may have changed
 
 
 class HBVMStepper(ABC):
@@ -161,7 +165,8 @@ class HBVMStepper(ABC):
         self._implicit: tuple[Workspace, Workspace] | None = None
         self._dim, self._pace = y.size, Pace(CHUNK, y.size)
         self._status, self._reason = Status.RUNNING, ""
-        self._pair = pair = program.pair(par)
+        self._pair, self._par = program.pair(par), par
+        pair = self._pair
         self._context, self._partial = pair.own, pair.partial
         program.begin(pair, y, par, t0)
         if program.solver.strategy == ALWAYS_IMPLICIT:
@@ -273,6 +278,21 @@ class HBVMStepper(ABC):
     def y(self) -> Array:
         """A copy of the state at the last step."""
         return self._context.read()
+
+    @property
+    def par(self) -> Array:
+        """A copy of the present parameters, which an event may have changed; shape (n_par,)."""
+        return self._context.par.copy()
+
+    def _renew(self, par: Array) -> None:
+        """Let other parameters be the present ones."""
+        assert self._pair is not None
+        if np.array_equal(par, self._context.par):
+            return
+        self._pair.forget()
+        self._program.renew(self._context, self._partial, par)
+        for workspace in self._implicit or ():
+            workspace.forget()
 
     @property
     def status(self) -> Status:
@@ -452,6 +472,7 @@ class HBVMStepper(ABC):
             self._reason,
             None if self._vectors is None else self._vectors.save(),
             self._context.stages.copy() if self._recorded else None,
+            self.par,
         )
 
     @one_thread
@@ -477,6 +498,8 @@ class HBVMStepper(ABC):
                 "this checkpoint is of another version of hbvm-bench, whose steps depend on other numbers; "
                 "restore it with that version, or begin anew."
             )
+        if checkpoint.par is not None:
+            self._renew(checkpoint.par)
         self._context.words[self._places] = checkpoint.words
         self._set_step(self._context.h)
         for array, kept in zip(arrays, checkpoint.arrays, strict=True):
@@ -497,7 +520,7 @@ class HBVMStepper(ABC):
 
     @property
     def _identity(self) -> Identity:
-        return Identity.from_system(self._program.description, self._program.system, self._context.par)
+        return Identity.from_system(self._program.description, self._program.system, self._par)
 
     def _fill(self, between: int, times: Array, *steps_and_parts: NDArray[Any]) -> Made:
         """Make samples, in chunks so that Ctrl-C is heard between them."""
@@ -554,6 +577,12 @@ class HBVMStepper(ABC):
 
     def _handled(self, outcome: int) -> int:
         """Do what the kernel came back for; return whether it may go on, or what it ended with."""
+        if outcome == RENEW:
+            assert self.search is not None
+            self._renew(self.search.parameters)
+            outcome = self._enter(engine.GO_ON, self._context.address)
+            if outcome == DONE:
+                outcome = BUDGET if self._program.varying else ANEW
         if self.stop is not None and self.stop.is_set():
             raise KeyboardInterrupt
         if self._implicit or self._vectors:

@@ -25,6 +25,7 @@ from integrators.options import SHORTEST, SMALLEST
 from integrators.protocol import Array, Samples, Status
 from integrators.refusals import one_thread
 from integrators.running.watchdog import crawl
+from problems.errors import InputError
 
 LOOK_AHEAD = 2000  # steps of the look ahead, at most
 MOST_COMPARED = 20000  # of each of the trajectories that tell how errors grow: longer ones tell nothing
@@ -117,6 +118,14 @@ class AdaptiveStepper(HBVMStepper):
         ctx = self._context
         rest = (t - self.t) - ctx.time_low
         return abs(rest) <= SHORTEST * max(abs(t), abs(self.t), abs(ctx.controller.length_behind))
+
+    def _renew(self, par: Array) -> None:
+        super()._renew(par)
+        if not np.array_equal(self._program.breakpoints(par), self._breakpoints):
+            raise InputError(
+                f"an event at t = {self.t!r} changes parameters that the times at which "
+                f"{self._program.system.name} switches depend on; let it change none of these."
+            )
 
     def _restart(self, t: float) -> None:
         """Begin anew at a breakpoint: what is known from before it says nothing about what follows."""
@@ -299,7 +308,7 @@ class AdaptiveStepper(HBVMStepper):
             return Status.MAX_STEPS, (
                 f"max_steps={most} steps came to t = {self.t!r} only; give more, or a looser tol."
             )
-        why = self._watch.sees(self.t, steps, float(np.abs(self.y).max()))
+        why = self._watch.update(self.t, steps, float(np.abs(self.y).max()))
         return (Status.STALLED, why) if why else None
 
     @one_thread
@@ -358,6 +367,12 @@ class AdaptiveStepper(HBVMStepper):
         if outcome == UNDERFLOW and longest is not None and longest <= SHORTEST * abs(self.t):
             return Status.STEP_UNDERFLOW, (
                 f"a step of max_step={longest!r} from t = {self.t!r} cannot be told from none; give more."
+            )
+        ahead = self._context.controller.next_length
+        if outcome == UNDERFLOW and self._context.pace.code and (ahead == 0.0 or not math.isfinite(ahead)):
+            return Status.STEP_UNDERFLOW, (
+                "steps='reversible' follow the time scale of the field, and this one has none at "
+                f"t = {self.t!r}; leave it out."
             )
         if outcome == UNDERFLOW:
             return Status.STEP_UNDERFLOW, (

@@ -94,6 +94,7 @@ class Run:
         self._program, _ = prepared(method, problem.system)
         self._wanted = wanted_events(events, None)
         self._par = problem.par
+        self._acts = any(event.then is not None for event in self._wanted.values())
         self._before: list[Mapping[str, Occurrences]] = []
         self._shown: tuple[float, Array] | None = None
         self._terminates = any(event.last for event in self._wanted.values())
@@ -117,8 +118,8 @@ class Run:
             self._stepper.advance(np.array([t]))
             self._stepper.destination = None
 
-    def _anew(self, y: Array) -> None:
-        t = self.t
+    def _anew(self, y: Array, par: Array) -> None:
+        t, self._par = self.t, par
         if self._wanted:
             self._before.append(self._stepper.search.hits.occurrences())
         self._begin(y, t)
@@ -144,7 +145,7 @@ class Run:
     @y.setter
     def y(self, state: ArrayLike) -> None:
         values = check_state(state, self.problem.system.dim)
-        self._anew(values if self.method.precision == "double" else as_pairs(values, values.size))
+        self._anew(values if self.method.precision == "double" else as_pairs(values, values.size), self._now)
 
     @property
     def pairs(self) -> Array:
@@ -172,7 +173,7 @@ class Run:
     @pairs.setter
     def pairs(self, state: Any) -> None:
         self._check_digits()
-        self._anew(as_pairs(state, self.problem.system.dim, label="pairs"))
+        self._anew(as_pairs(state, self.problem.system.dim, label="pairs"), self._par)
 
     def to_mpmath(self) -> NDArray[Any]:
         """Return the current state as numbers of mpmath, exactly; shape (dim,).
@@ -188,18 +189,24 @@ class Run:
         check_digits(self.method, events=False, variations=False)
 
     @property
+    def _now(self) -> Array:
+        """The present parameters, which an event may have changed."""
+        return self._stepper.par if self._acts else self._par
+
+    @property
     def par(self) -> Array:
-        """The parameters, shape (n_par,), as `System.pack` has them; they can be set, by name too."""
-        return _frozen(self._par, 'run.par = {"name": value}')
+        """The current parameters, shape (n_par,), as `System.pack` has them; they can be set, by name too."""
+        return _frozen(self._now, 'run.par = {"name": value}')
 
     @par.setter
     def par(self, values: ArrayLike | Mapping[str, Any]) -> None:
         system = self.problem.system
         if isinstance(values, Mapping):
-            known: dict[str, Any] = {**system.unpack(self._par), **values}
+            known: dict[str, Any] = {**system.unpack(self._now), **values}
             values = system.pack(known)
-        self._par = check_parameters(values, system)
-        self._anew(self.y if self.method.precision == "double" else self.pairs)
+        self._anew(
+            self.y if self.method.precision == "double" else self.pairs, check_parameters(values, system)
+        )
 
     @property
     def status(self) -> Status:
@@ -226,7 +233,7 @@ class Run:
                 joined(name, "t"),
                 joined(name, "y"),
                 joined(name, "direction"),
-                None if event.then is None else joined(name, "after"),
+                *((joined(name, "after"), joined(name, "par")) if event.then is not None else ()),
             )
             for name, event in self._wanted.items()
         }
@@ -290,7 +297,7 @@ class Run:
         system = self.problem.system
         if "energy" not in system.invariants:
             raise InputError(f"{system.name} has no conserved energy.")
-        values = invariants.invariants(system, self._par, self.y[np.newaxis], np.array([self.t]))
+        values = invariants.invariants(system, self._now, self.y[np.newaxis], np.array([self.t]))
         return float(values["energy"][0])
 
     def __repr__(self) -> str:

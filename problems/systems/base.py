@@ -205,7 +205,6 @@ class System:
         self,
         function: Callable[..., Any],
         label: str,
-        outputs: int | None = None,
         *,
         data: tuple[int, ...] | None = None,
     ) -> Function:
@@ -217,8 +216,6 @@ class System:
             Returns one number; its arguments are among ``t, q, p, y, par, m``.
         label : str
             Description for messages.
-        outputs : int, optional
-            Length of the returned list; by default the function returns one number.
         data : tuple of int, optional
             The shape, () or (n,), of a further argument ``data``, whose numbers come after the parameters.
 
@@ -232,19 +229,79 @@ class System:
         value = arguments.call(
             function, graph=graph, dim=self.dim, layout=self._layout, label=label, more=more
         )
-        if outputs is None:
-            values = [value]
-        elif arguments.is_list(value) and len(value) == outputs:
-            values = list(value)
-        else:
-            raise InputError(f"{label} must return a list of {outputs} numbers, the new state.")
+        return function_of(graph, [arguments.scalar(value, graph=graph, function=function, label=label)])
+
+    def trace_change(self, function: Callable[..., Any], label: str) -> Function:
+        """Trace a function of the same arguments that returns another state, and perhaps other parameters.
+
+        Parameters
+        ----------
+        function : callable
+            Returns the new state, or a tuple of that and of parameters by name; see `changed`.
+        label : str
+            What it is, for messages.
+
+        Returns
+        -------
+        Function
+            dim outputs; or dim + n_par, where parameters are among what it returns.
+
+        Raises
+        ------
+        problems.errors.InputError
+            For anything that cannot be traced, with the line, and what is no state.
+        """
+        graph = Graph(self.dof)
+        value = arguments.call(function, graph=graph, dim=self.dim, layout=self._layout, label=label)
+        state = arguments.Vector(graph, "y", "y", 0, self.dim)
+        par = arguments.Vector(graph, "par", "par", 0, self.n_par)
+        values, parameters = self.changed(value, state, par, label)
+        values += parameters if is_change(value) else []
         return function_of(
-            graph,
-            [
-                arguments.scalar(component, graph=graph, function=function, label=label)
-                for component in values
-            ],
+            graph, [arguments.scalar(x, graph=graph, function=function, label=label) for x in values]
         )
+
+    def changed(
+        self, value: Any, state: Iterable[Any], par: Iterable[Any], label: str
+    ) -> tuple[list[Any], list[Any]]:
+        """Return the state and the parameters that a function has made of the present ones.
+
+        Parameters
+        ----------
+        value : list, or tuple of list and mapping
+            What it has returned: the new state, or that and what parameters become, by name. The state is
+            ``None`` where it stays.
+        state, par : iterable
+            The present ones, of any kind of numbers.
+        label : str
+            What the function is, for messages.
+
+        Raises
+        ------
+        problems.errors.InputError
+            For a state of another length, a parameter that there is none of, or one of another length.
+        """
+        new: Any = value
+        changes: Mapping[str, Any] = {}
+        if is_change(value):
+            new, changes = value
+            new = list(state) if new is None else new
+        if not _is_list(new) or len(new) != self.dim:
+            raise InputError(
+                f"{label} must return a list of {self.dim} numbers, the new state, or a tuple of that and a "
+                "dict of parameters."
+            )
+        parameters = list(par)
+        for name, given in changes.items():
+            if name not in self._layout:
+                raise unknown(f"parameter of {self.name}", name, self._layout)
+            offset, size = self._layout[name]
+            several = _is_list(given)
+            if several != (size is not None) or (several and len(given) != size):
+                wanted = "one number" if size is None else f"a list of {size} numbers"
+                raise InputError(f"{label} must return {wanted} for the parameter {name!r}.")
+            parameters[offset : offset + (size or 1)] = list(given) if several else [given]
+        return list(new), parameters
 
     @property
     def separable(self) -> bool:
@@ -472,6 +529,15 @@ class System:
             key: float(par[offset]) if size is None else par[offset : offset + size].copy()
             for key, (offset, size) in self._layout.items()
         }
+
+
+def is_change(value: Any) -> bool:
+    """Whether a function has returned a state and parameters, not a state alone."""
+    return isinstance(value, tuple) and len(value) == 2 and isinstance(value[1], Mapping)
+
+
+def _is_list(value: Any) -> bool:
+    return arguments.is_list(value) or len(getattr(value, "shape", ())) == 1
 
 
 def _layout(parameters: Mapping[str, Value]) -> tuple[dict[str, tuple[int, int | None]], int]:

@@ -16,10 +16,10 @@ from integrators.kernel.native.jit import compiled
 from integrators.kernel.parts.implicit import FIXED_POINT
 from integrators.kernel.parts.kinks import EXTRAPOLATED
 from integrators.kernel.simd.memory import call_steps, put, splat8
+from integrators.kernel.step.anew import reset
 from integrators.kernel.step.begin import INFINITY, is_within_reach
 from integrators.kernel.step.control import defect_power, error_power, is_distinct
 from integrators.kernel.step.kinks import arrived, end_behind, is_near_one
-from integrators.kernel.step.loop import reset
 from integrators.kernel.step.rule import FIRST_RATE, SMALLEST
 from integrators.kernel.step.size import speed_of
 from integrators.kernel.step.vary import (

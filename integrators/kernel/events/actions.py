@@ -1,15 +1,16 @@
 """Events that change the state: which comes first in a step, what it makes of the state, and where to go on.
 
-The step is solved anew to the first of them. Its function is 0 there, and the sign that it has next, which
+An adaptive step is solved anew to the first of them; of a fixed step, the partial step up to there, by which
+the event was found, is all that is taken. Its function is 0 there, and the sign that it has next, which
 rounding hides, is that of its slope along the trajectory from the new state: so the same zero is not found
 again. Where the slope is nothing too, the trajectory stays there.
 """
 
-from integrators.kernel.context import ACCUMULATE, ACTS, DONE, HALTED
-from integrators.kernel.events.memory import RAISED, TERMINAL, TINY
+from integrators.kernel.context import ACCUMULATE, ACTS, DONE, HALTED, RENEW, VALUES
+from integrators.kernel.events.memory import GOING, RAISED, TERMINAL, TINY, UNDEFINED
 from integrators.kernel.events.sample import NAN, function, is_finite, noise_of, sign, spread_state
 from integrators.kernel.native.jit import compiled
-from integrators.kernel.simd.memory import call_field, put, splat8
+from integrators.kernel.simd.memory import call_field, call_line, put, splat8
 from integrators.kernel.step.sample import read, vectors_of_state
 
 SIMULTANEOUS = 2.0**-49  # times whose relative difference is at most this are the same
@@ -66,6 +67,8 @@ def end_step(ctx, search, before):
         search.due[event] = 0
     if first >= 0:
         end, kept = search.hit_times[first], before
+        for d in range(search.dim):
+            search.action_state[d] = search.hit_states[search.dim * first + d]
         ctx.events.time = end
         close = SIMULTANEOUS * abs(end)
         for i in range(before, search.hits):
@@ -87,23 +90,56 @@ def end_step(ctx, search, before):
 
 @compiled
 def make(ctx, search, event):
-    """Make the new state by the event's action; return whether it could be made."""
+    """Make the new state and parameters by the event's action; return GOING, or why there are none."""
+    dim, count, outputs = search.dim, search.parameters, search.action_outputs
     spread_state(search, search.time, search.new_state)
-    search.action_outputs[8 * search.dim] = 0.0
-    call_field(search.actions[event], search.times, search.block, ctx.par, search.action_outputs)
-    if search.action_outputs[8 * search.dim] != 0.0:
+    for i in range(count):  # an action that changes none writes none
+        outputs[8 * (dim + i)] = search.new_par[i]
+    outputs[8 * (dim + count)] = 0.0
+    call_field(search.actions[event], search.times, search.block, search.new_par, outputs)
+    if outputs[8 * (dim + count)] != 0.0:
         search.raised = -1 - event
-        return False
-    for d in range(search.dim):
-        search.new_state[d] = search.action_outputs[8 * d]
-    return True
+        return RAISED
+    for i in range(dim + count):
+        if not is_finite(outputs[8 * i]):
+            search.event = event
+            return UNDEFINED
+    for d in range(dim):
+        search.new_state[d] = outputs[8 * d]
+    for i in range(count):
+        search.new_par[i] = outputs[8 * (dim + i)]
+    return GOING
+
+
+@compiled
+def put_state(ctx, given):
+    """Let a state be the present one."""
+    for i in range(vectors_of_state(ctx)):
+        put(ctx.state, 8 * i, splat8(0.0))
+        put(ctx.error, 8 * i, splat8(0.0))
+    read(ctx, ctx.state, given)
+
+
+@compiled
+def has_new_parameters(ctx, search):
+    """Whether the parameters have changed."""
+    changed = False
+    for i in range(search.parameters):
+        changed = changed or search.new_par[i] != ctx.par[i]
+    return changed
 
 
 @compiled
 def change_state(ctx, search):
-    """Note what happens at the present state, and change it; return DONE or HALTED."""
+    """Note what happens at the end of the step, and change the state; return DONE, RENEW or HALTED."""
+    if ctx.varying == 0:
+        put_state(ctx, search.action_state)
     for d in range(search.dim):
+        if ctx.varying == 0:
+            search.step_state[d] = search.action_state[d]
         search.new_state[d] = search.step_state[d]
+    for i in range(search.parameters):
+        search.new_par[i] = ctx.par[i]
     for event in range(search.count):
         search.event = event
         search.values_before[event] = function(ctx, search, search.time, search.step_state)
@@ -116,21 +152,28 @@ def change_state(ctx, search):
         search.hit_directions[i] = search.due_directions[event]
         search.happened[event] += 1
         if search.happened[event] == search.limits[event]:
-            search.halted, halted = TERMINAL, True
-        elif not make(ctx, search, event):
-            search.halted = RAISED
-            return HALTED
+            halted = True
+        else:
+            search.halted = make(ctx, search, event)
+            if search.halted != GOING:
+                return HALTED
         for d in range(search.dim):
             search.hit_states[search.dim * i + d] = search.step_state[d]
             search.hit_after[search.dim * i + d] = search.new_state[d]
+        for j in range(search.parameters):
+            search.hit_par[search.parameters * i + j] = search.new_par[j]
         search.hits = i + 1
     if halted:
+        search.halted = TERMINAL
         return HALTED
-    for i in range(vectors_of_state(ctx)):
-        put(ctx.state, 8 * i, splat8(0.0))
-        put(ctx.error, 8 * i, splat8(0.0))
-    read(ctx, ctx.state, search.new_state)
-    return DONE
+    put_state(ctx, search.new_state)
+    return RENEW if has_new_parameters(ctx, search) else DONE
+
+
+@compiled
+def length_ahead(ctx):
+    """Return about how long the step ahead is."""
+    return ctx.controller.next_length if ctx.varying else ctx.h
 
 
 @compiled
@@ -139,12 +182,17 @@ def set_state_ahead(ctx, search):
 
     It is there to see where functions go. Return whether it is finite.
     """
-    lanes, rows, values, move = ctx.lanes, ctx.rows, ctx.scratch.sums, AHEAD * ctx.controller.next_length
-    for lane in range(lanes):
-        ctx.times[lane] = ctx.t0
-        for d in range(rows):
-            ctx.stages[lanes * d + lane] = search.step_state[d]
-    call_field(ctx.field, ctx.times, ctx.stages, ctx.par, values)
+    lanes, rows, values, move = ctx.lanes, ctx.rows, ctx.scratch.sums, AHEAD * length_ahead(ctx)
+    for block in range(ctx.calls if ctx.line else 1):
+        for lane in range(lanes):
+            ctx.times[lanes * block + lane] = ctx.t0
+            for d in range(rows):
+                ctx.stages[lanes * (ctx.padded * block + d) + lane] = search.step_state[d]
+    if ctx.line:  # what the field writes is not the slope
+        call_line(ctx.line, VALUES, ctx)
+        values = ctx.values
+    else:
+        call_field(ctx.field, ctx.times, ctx.stages, ctx.par, values)
     ctx.counters.evaluations += 1
     finite = True
     for d in range(rows):
@@ -172,7 +220,7 @@ def begin_anew(ctx, search):
         before = search.values_before[event]
         search.touched[event] = NAN
         if search.due[event] and abs(value) <= noise + RESIDUE * abs(before):
-            ahead = function(ctx, search, t + AHEAD * ctx.controller.next_length, search.end_state)
+            ahead = function(ctx, search, t + AHEAD * length_ahead(ctx), search.end_state)
             if not finite or not abs(ahead - value) > noise:
                 return ACCUMULATE
             value = TINY * sign(ahead - value)
@@ -180,4 +228,7 @@ def begin_anew(ctx, search):
             value = TINY * sign(before if abs(before) > noise else search.ends[event])
         search.ends[event] = value
         search.due[event] = 0
-    return HALTED if search.raised else DONE
+    if search.raised:
+        search.halted = RAISED
+        return HALTED
+    return DONE

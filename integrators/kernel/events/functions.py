@@ -105,7 +105,7 @@ class EventFunction:
 
 
 class Action:
-    """What an event makes of the state, for one system: a function like `EventFunction`, of dim numbers.
+    """What an event makes of the state and the parameters, for one system: a function like `EventFunction`.
 
     Parameters
     ----------
@@ -119,7 +119,8 @@ class Action:
     Attributes
     ----------
     address : int
-        Of the C function; the state in the first lane is the one that counts.
+        Of the C function, of dim values, or dim + n_par where it changes parameters; the state in the first
+        lane is the one that counts.
 
     Raises
     ------
@@ -131,12 +132,12 @@ class Action:
         self._system, self._raised = problem.system, _Raised()
         label = f"then of event {name!r}"
         try:
-            traced = problem.system.trace(then, label, problem.system.dim)
+            traced = problem.system.trace_change(then, label)
         except InputError as refused:
-            self._then, self._wanted, self._what = then, _wanted(then, refused), label
+            self._then, self._wanted, self._label = then, _wanted(then, refused), label
             with np.errstate(all="ignore"):
                 try:
-                    self._new_state(problem.t0, problem.y0.copy(), problem.par.copy())
+                    self._change(problem.t0, problem.y0.copy(), problem.par.copy())
                 except InputError:
                     raise
                 except Exception:
@@ -150,26 +151,27 @@ class Action:
         """What the function raised last in this thread, if Python runs it."""
         return self._raised.error
 
-    def _new_state(self, t: float, y: Any, par: Any) -> Any:
+    def _change(self, t: float, y: Any, par: Any) -> Any:
+        """Return the new state, and behind it the new parameters."""
         parameters = SimpleNamespace(**self._system.unpack(par))
         value = _called(self._then, self._wanted, self._system.dof, t, y, parameters)
-        state = np.asarray(value, dtype=np.float64)
-        if state.shape != (self._system.dim,):
-            raise InputError(f"{self._what} must return {self._system.dim} numbers, the new state.")
-        return state
+        return np.concatenate(
+            [np.asarray(part, np.float64) for part in self._system.changed(value, y, par, self._label)]
+        )
 
     def _call(self, t: int, states: int, par: int, values: int) -> None:
-        dim = self._system.dim
+        dim, n_par = self._system.dim, self._system.n_par
+        count = dim + n_par
         try:
             if raised.kept() is not None:
-                _numbers(values, LANES * dim + 1)[LANES * dim] = 1.0
+                _numbers(values, LANES * count + 1)[LANES * count] = 1.0
                 return
             state = _numbers(states, LANES * dim)[::LANES].copy()
-            given = _numbers(par, self._system.n_par).copy()
-            _numbers(values, LANES * dim)[::LANES] = self._new_state(float(_numbers(t, 1)[0]), state, given)
+            given = _numbers(par, n_par).copy()
+            _numbers(values, LANES * count)[::LANES] = self._change(float(_numbers(t, 1)[0]), state, given)
         except BaseException as error:  # also Ctrl-C: nothing passes through compiled code
             self._raised.error = error
-            _numbers(values, LANES * dim + 1)[LANES * dim] = 1.0
+            _numbers(values, LANES * count + 1)[LANES * count] = 1.0
 
 
 def _called(

@@ -12,7 +12,7 @@ CACHED = 32  # states of a step that are remembered
 # What is looked at: the step that is solved, what of it there is up to a time, the start alone.
 WHOLE, PART, START = range(3)
 # Why a look has come back without success.
-GOING, TERMINAL, FULL, UNRESOLVED, RAISED, UNSOLVABLE = range(6)
+GOING, TERMINAL, FULL, UNRESOLVED, RAISED, UNSOLVABLE, UNDEFINED = range(7)
 
 
 class Search(Memory):
@@ -30,6 +30,7 @@ class Search(Memory):
     sign = Real()  # of the direction of time
     limits = Array("count", kind=int)  # the occurrence that ends the integration; 0: none
     dim = Integer()
+    parameters = Integer()
     terms = Integer()  # of the step's polynomial
     chunks = Integer()  # of eight first samples
     degree = Integer()  # of the polynomials through the first samples; a power of 2
@@ -59,6 +60,7 @@ class Search(Memory):
     hit_times = Array()
     hit_states = Array()
     hit_after = Array()  # states that the events' actions have made of these
+    hit_par = Array()  # parameters from then on
     hit_events = Array(kind=int)
     hit_directions = Array(kind=int)
 
@@ -66,10 +68,11 @@ class Search(Memory):
     due = Array("count", kind=int)  # 1: it happens there
     due_directions = Array("count", kind=int)
     values_before = Array("count")  # of the functions, before the state is changed
+    action_state = Array("dim")  # at the first event that ends the step
     new_state = Array("dim")
-    action_outputs = Array(
-        "made_rows", 8
-    )  # a new state, in columns; the first of the last row: 1 where making it has raised
+    new_par = Array("parameters")
+    # A new state and parameters, in columns; the first of the last row: 1 where making them has raised.
+    action_outputs = Array("made_rows", 8)
     made_rows = Integer()
 
     # --- how it stands ---

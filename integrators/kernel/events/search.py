@@ -20,6 +20,7 @@ from integrators.kernel.events.memory import (
     RAISED,
     START,
     TERMINAL,
+    UNDEFINED,
     UNRESOLVED,
     UNSOLVABLE,
     WHOLE,
@@ -30,7 +31,7 @@ from integrators.protocol import Array, Status, UserError
 
 LEAST, MOST = 8, 16  # samples in a step to begin with; more where these do not show the function
 HITS, NUMBERS = 1024, 1 << 17  # occurrences, and components of their states, that are kept until Python asks
-LASTING = ("ends", "touched", "finite", "happened", "due", "due_directions")
+LASTING = ("ends", "touched", "finite", "happened", "due", "due_directions", "action_state")
 
 
 @lru_cache(maxsize=1)
@@ -86,12 +87,13 @@ class KernelSearch:
     ):  # fmt: skip
         self._functions, self._actions = functions, actions
         self._context, partial = contexts
-        self._dim, n = self._context.shape.dim, len(events)
+        self._dim, n_par, n = self._context.shape.dim, self._context.par.size, len(events)
         degree = 1 << (min(max(2 * self._context.s, LEAST), MOST) - 1).bit_length()
         numbers = {
             "count": n, "dim": self._dim, "degree": degree, "chunks": degree // 8, "terms": self._context.s,
             "steps": steps, "own": self._context.address, "partial": partial.address,
-            "made_rows": 1 + self._dim, "last": end, "sign": 1.0 if end >= self._context.t0 else -1.0,
+            "parameters": n_par, "made_rows": 1 + self._dim + n_par, "last": end,
+            "sign": 1.0 if end >= self._context.t0 else -1.0,
         }  # fmt: skip
         cosines, self._tables, transforms = _tables()
         self._memory = memory = Search(numbers, {"cosines": cosines, "transforms": transforms})
@@ -100,8 +102,8 @@ class KernelSearch:
         memory.directions[:] = [event.direction for event in events.values()]
         memory.limits[:] = [event.last for event in events.values()]
         memory.actions[:] = [actions[name].address if name in actions else 0 for name in events]
-        self._hits = Hits(events, memory.sign, self._dim)
-        self._make_room(max(8, min(HITS, NUMBERS // self._dim)))
+        self._hits = Hits(events, memory.sign, self._dim, memory.parameters)
+        self._make_room(self._first_room)
         self.trouble: tuple[Status, str, Exception | None] | None = None
         if self._look(START) != DONE:
             error = self._error
@@ -110,13 +112,18 @@ class KernelSearch:
         self._context.events.code = look.code().address
         self._context.events.act, self._context.events.acted = int(bool(actions)), -memory.sign * np.inf
 
+    @property
+    def _first_room(self) -> int:
+        return max(8, min(HITS, NUMBERS // max(self._dim, self._memory.parameters)))
+
     def _make_room(self, room: int) -> None:
         self._times, self._states, self._after = np.empty(room), *np.empty((2, room, self._dim))
+        self._par = np.empty((room, self._memory.parameters))
         self._events, self._directions = np.empty((2, room), dtype=np.int64)
         self._memory.point(
             {
                 "hit_times": self._times, "hit_states": self._states, "hit_after": self._after,
-                "hit_events": self._events, "hit_directions": self._directions,
+                "hit_par": self._par, "hit_events": self._events, "hit_directions": self._directions,
             }
         )  # fmt: skip
         self._memory.room = room
@@ -147,7 +154,7 @@ class KernelSearch:
         self.hits  # noqa: B018 -- makes room
         if halted == FULL and not enough:
             self._make_room(2 * memory.room)
-        if halted in (RAISED, UNRESOLVED, UNSOLVABLE):
+        if halted in (RAISED, UNRESOLVED, UNSOLVABLE, UNDEFINED):
             self._give_up(halted)
             return not self._context.events.act  # what an action would have changed is not known any more
         return halted != TERMINAL
@@ -160,6 +167,11 @@ class KernelSearch:
         if halted == RAISED:
             error = self._error
             self.trouble = Status.USER_ERROR, f"{UserError(error)}: events {known}", error
+            return
+        if halted == UNDEFINED:
+            name, t = self._hits.names[memory.event], memory.time
+            reason = f"then of the event {name!r} returns a number that is not finite at t = {t!r}."
+            self.trouble = Status.NOT_FINITE, reason, None
             return
         reason = f"the partial step from t = {memory.known!r} to t = {memory.goal!r} cannot be solved."
         if halted == UNRESOLVED:
@@ -175,9 +187,15 @@ class KernelSearch:
         """What has happened."""
         n, self._memory.hits = self._memory.hits, 0
         self._hits.take(
-            self._times[:n], self._states[:n], self._after[:n], self._events[:n], self._directions[:n]
-        )
+            self._times[:n], self._states[:n], self._after[:n], self._events[:n], self._directions[:n],
+            self._par[:n],
+        )  # fmt: skip
         return self._hits
+
+    @property
+    def parameters(self) -> Array:
+        """The parameters that the last actions have made; shape (n_par,)."""
+        return self._memory.new_par.copy()
 
     def finish(self, end: float) -> None:
         """Look at what there is of the step ahead, which is solved, up to a time."""

@@ -1,5 +1,6 @@
 """Where a function changes its sign between two places, and where it is largest."""
 
+from integrators.kernel.events.memory import TINY
 from integrators.kernel.events.sample import is_finite, sign
 from integrators.kernel.events.value import value_at
 from integrators.kernel.native.jit import compiled
@@ -11,6 +12,7 @@ MOST = 200  # evaluations for a zero
 CLOSE = 1e-3  # of the stretch: two places as close tell the slope at the zero between or beside them
 EXTREMUM = 1e-10  # of the stretch: where an extremum is, if the values near it can be told apart
 EDGE, MOVES = 1e-3, 8  # part of a bracket that is its edge; how often it is moved
+NEARER = 0.125  # a place as many times closer to the start is tried next
 GOLDEN = 0.3819660112501051  # (3 - sqrt 5) / 2
 MOST_LOOKS = 500  # evaluations for an extremum
 NAN = float("nan")
@@ -37,11 +39,28 @@ def continued(ctx, search, x, otherwise):
 
 
 @compiled
+def leave_start(ctx, search, a, b):
+    """Return a place beyond ``a`` with the sign that the function has there, before it changes towards ``b``.
+
+    After an event that changes the state the function is 0 at the start of a step and only its sign is known;
+    a step of fixed size may be much longer than the time to the next zero. ``a`` itself if there is none.
+    """
+    before, distance = value_at(ctx, search, a), NEARER * (b - a)
+    while distance > search.resolution:
+        if sign(value_at(ctx, search, a + distance)) == sign(before):
+            return a + distance
+        distance *= NEARER
+    return a
+
+
+@compiled
 def zero_between(ctx, search, a, b):
     """Return the place of a change of sign between two places, to the last bit of time.
 
     The polynomial tells where to begin. Then secants, and halves where these do not close in.
     """
+    if a == 0.0 and ctx.events.act and ctx.varying == 0 and abs(search.start_value) <= TINY:
+        a = leave_start(ctx, search, a, b)
     low, high, at_low, at_high = a, b, value_at(ctx, search, a), value_at(ctx, search, b)
     otherwise, width = at_high, b - a
     x, slope = guess(search, a, b)

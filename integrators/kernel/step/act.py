@@ -1,10 +1,17 @@
-"""Events that change the state: steps end where one happens, and the next begins from the new state."""
+"""Events that change the state: steps end where one happens, and the next begins from the new state.
 
-from integrators.kernel.context import ACCUMULATE, ACTS, BY_VALUES, DONE, UNSOLVED
+An adaptive step is solved anew to the event. Of a fixed step, the part up to the event is taken, which the
+search has solved to find it, and steps of the same size are counted from there.
+"""
+
+from integrators.kernel.context import ACCUMULATE, ACTS, ANEW, BY_VALUES, DONE, RENEW, UNSOLVED
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.parts.events import BEGIN_ANEW, CHANGE
 from integrators.kernel.simd.memory import call_look
+from integrators.kernel.step.advance import looked, solve
+from integrators.kernel.step.anew import begin_anew
 from integrators.kernel.step.control import is_distinct
+from integrators.kernel.step.finish import commit, finish
 from integrators.kernel.step.vary import attempt
 
 ONWARD = 1.25  # times that are probably enough to see the next one
@@ -39,13 +46,33 @@ def end_at_action(ctx):
 
 
 @compiled
+def act(ctx):
+    """Go on from the state that an event at the end of the step behind makes; the outcome."""
+    outcome = change(ctx)
+    return go_on(ctx) if outcome == DONE else outcome
+
+
+@compiled
 def change(ctx):
     """Let the event that has ended the step behind change the state; the outcome."""
     events = ctx.events
     ctx.t0, ctx.time_low = events.time, 0.0
     outcome = call_look(events.code, ctx, events.memory)
-    if outcome == DONE:
+    if outcome in (DONE, RENEW):
         events.acting = BEGIN_ANEW
+    return outcome
+
+
+@compiled
+def go_on(ctx):
+    """Begin at the state that an event has made, and let the search for events begin there; the outcome."""
+    controller, events = ctx.controller, ctx.events
+    if ctx.varying:
+        controller.next_length, controller.length_behind = length_after_action(ctx), 0.0
+    events.acted = ctx.t0
+    begin_anew(ctx)
+    outcome = call_look(events.code, ctx, events.memory)
+    events.acting = 0
     return outcome
 
 
@@ -57,14 +84,55 @@ def length_after_action(ctx):
     """
     events = ctx.events
     length, since = events.length_before, ONWARD * (ctx.t0 - events.acted)
-    events.acted = ctx.t0
     return since if abs(since) < abs(length) else length
 
 
 @compiled
-def begin_events(ctx):
-    """Let the search for events begin at the new state; the outcome."""
+def look_ahead(ctx):
+    """Solve the fixed step ahead and look for events in it, unless that is done; the outcome."""
     events = ctx.events
-    outcome = call_look(events.code, ctx, events.memory)
-    events.acting = 0
+    if ctx.solved == UNSOLVED:
+        events.seen = events.acting = 0
+    outcome = solve(ctx)
+    if outcome != DONE or events.seen:
+        return outcome
+    outcome = finish(ctx)
+    if outcome == DONE:
+        outcome = call_look(events.code, ctx, events.memory)
+    if outcome == ACTS:
+        events.acting, outcome = CHANGE, DONE
+    if outcome == DONE:
+        events.seen = 1
     return outcome
+
+
+@compiled
+def step_or_act(ctx, t, within):
+    """Take one fixed step, or where an event in it changes the state, only that up to there; the outcome.
+
+    With ``within`` none is taken, and the event happens only if it comes no later than the time ``t``.
+    """
+    events = ctx.events
+    outcome = look_ahead(ctx)
+    if outcome != DONE:
+        return outcome
+    if events.acting and not (within and (t - events.time) * ctx.h < 0.0):
+        return act_within(ctx)
+    if within:
+        return DONE
+    outcome = looked(ctx)
+    if outcome == DONE:
+        commit(ctx)
+    return outcome
+
+
+@compiled
+def act_within(ctx):
+    """Let the event within the fixed step ahead change the state, and go on from there; the outcome."""
+    events = ctx.events
+    if not is_distinct(events.time - events.acted, events.time):
+        return ACCUMULATE
+    ctx.n, ctx.solved, events.seen = 0, UNSOLVED, 0
+    ctx.counters.steps += 1
+    outcome = act(ctx)
+    return ANEW if outcome == DONE else outcome

@@ -1,10 +1,12 @@
 """What Python calls: the one C function of the steps."""
 
 from integrators.kernel.context import DONE
-from integrators.kernel.native.engine import ADVANCE, PART, RESET
+from integrators.kernel.native.engine import ADVANCE, GO_ON, PART, RESET
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.views import doubles, integers
-from integrators.kernel.step.loop import advance, context, reset, take_steps
+from integrators.kernel.step.act import go_on
+from integrators.kernel.step.anew import reset
+from integrators.kernel.step.loop import advance, context, take_steps
 from integrators.kernel.step.sample import part_step, write
 
 
@@ -15,7 +17,8 @@ def entry(operation, ctx, partial, between, count, times, targets, parts, first,
     RESET: put the trajectory at the state at ``out``. ADVANCE: see `loop.advance`.
     TAKE: take up to ``budget`` steps, none beyond times[0], which are then in ``times``.
     PART: write the state parts[0] beyond the present one to ``out``, and count nothing; parts[1] is
-    the length of the last one from there, or 0.
+    the length of the last one from there, or 0. GO_ON: begin at the state that an event has made, with the
+    parameters that are now in memory.
     """
     t, n, p, y = doubles(times), integers(targets), doubles(parts), doubles(out)
     if operation == RESET:
@@ -28,4 +31,6 @@ def entry(operation, ctx, partial, between, count, times, targets, parts, first,
         if outcome == DONE:
             write(context(partial), context(partial).next_state, y)
         return outcome
+    if operation == GO_ON:
+        return go_on(context(ctx))
     return take_steps(context(ctx), t, y, budget)

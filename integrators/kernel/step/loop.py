@@ -1,22 +1,13 @@
 """Whole trajectories: steps to the times asked for."""
 
-from integrators.kernel.context import BUDGET, DONE, STATE, UNSEEN, UNSOLVED, Context
+from integrators.kernel.context import BUDGET, DONE, STATE, UNSEEN, Context
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
-from integrators.kernel.parts.implicit import ALWAYS_IMPLICIT
-from integrators.kernel.parts.kinks import NOTHING
-from integrators.kernel.simd.memory import put, splat8
-from integrators.kernel.step.act import begin_events, change, end_at_action, length_after_action
+from integrators.kernel.step.act import act, end_at_action, step_or_act
 from integrators.kernel.step.advance import looked, step, watched
-from integrators.kernel.step.begin import set_factors
-from integrators.kernel.step.estimate import first_length, shorten_first
-from integrators.kernel.step.finish import arrive
+from integrators.kernel.step.estimate import shorten_first
 from integrators.kernel.step.kinks import arrived, holds
-from integrators.kernel.step.projection import take_energy
-from integrators.kernel.step.reversible import begin_pace
-from integrators.kernel.step.rule import FIRST_RATE
-from integrators.kernel.step.sample import dimension, followed, read, sample, vectors_of_state, write
-from integrators.kernel.step.surfaces import find_surface
+from integrators.kernel.step.sample import dimension, followed, sample, write
 from integrators.kernel.step.vary import CLOSE, ready, remaining, take
 
 context = view(Context)
@@ -28,7 +19,7 @@ def repeat(ctx, target, budget):
     for _ in range(ctx.n, target):
         if budget == 0:
             return BUDGET, budget
-        outcome = step(ctx)
+        outcome = step_or_act(ctx, 0.0, False) if ctx.events.act else step(ctx)
         if outcome != DONE:
             return outcome, budget
         budget -= 1
@@ -39,17 +30,6 @@ def repeat(ctx, target, budget):
 def look_first(ctx):
     """Look for events in the solved step, if they may end it; the outcome."""
     return end_at_action(ctx) if ctx.events.act and ctx.events.seen == 0 else DONE
-
-
-@compiled
-def act(ctx):
-    """Go on from the state that an event at the end of the step behind makes; the outcome."""
-    outcome = change(ctx)
-    if outcome != DONE:
-        return outcome
-    ctx.controller.next_length, ctx.controller.length_behind = length_after_action(ctx), 0.0
-    begin_anew(ctx)
-    return begin_events(ctx)
 
 
 @compiled
@@ -130,6 +110,8 @@ def advance(ctx, partial, between, count, times, targets, parts, first, out, bud
             else:
                 outcome, budget = repeat(ctx, targets[i], budget)
                 part = parts[i]
+                if outcome == DONE and ctx.events.act and part != 0.0:
+                    outcome = step_or_act(ctx, times[i], True)
             if outcome == DONE:
                 outcome = sample(ctx, partial, between, times[i], part, out + dim * i)
         if outcome != DONE:
@@ -183,43 +165,3 @@ def take_steps(ctx, times, out, budget):
         if outcome != DONE:
             ctx.samples_written = count
             return outcome
-
-
-@compiled
-def reset(ctx, start):
-    """Put a trajectory at a start, at t0, with h or a first length: no history.
-
-    What follows is the same, bit for bit, whatever the memory was used for before. The implicit solver's
-    own memory is not here.
-    """
-    for i in range(vectors_of_state(ctx)):
-        put(ctx.state, 8 * i, splat8(0.0))
-        put(ctx.error, 8 * i, splat8(0.0))
-    read(ctx, ctx.state, start)
-    ctx.samples_written = 0
-    begin_anew(ctx)
-
-
-@compiled
-def begin_anew(ctx):
-    """Begin at the present state, at t0: no history."""
-    solver, implicit = ctx.solver, ctx.implicit
-    if ctx.energy.code:
-        take_energy(ctx)
-    set_factors(ctx, ctx.h)
-    ctx.length = ctx.older_length = 0.0
-    ctx.n = ctx.blocks.age = solver.free = 0
-    ctx.solved = UNSOLVED
-    ctx.kinks.border = ctx.kinks.border_ahead = NOTHING
-    find_surface(ctx)
-    solver.outcome = DONE
-    ctx.time_low, solver.rate = 0.0, FIRST_RATE
-    if implicit.strategy != ALWAYS_IMPLICIT:
-        implicit.active = implicit.slow = implicit.held = implicit.left = 0
-    arrive(ctx)
-    if ctx.pace.code:
-        begin_pace(ctx)
-    elif ctx.varying and ctx.controller.next_length == 0.0:
-        ctx.controller.next_length = first_length(ctx)
-        shorten_first(ctx)
-        ctx.blocks.age = 0

@@ -18,6 +18,7 @@ integrate_many: Any = integrators.integrate_many
 BALL = Hamiltonian(lambda q, p: p[0] ** 2 / 2 + q[0], dof=1, name="ball")
 PLAIN = VectorField(lambda y: [y[1], -1.0], dim=2, name="ball as a field")
 END = 30.0
+BOTH = pytest.mark.parametrize("method", [HBVM(), HBVM(k=4, s=2, h=0.1)], ids=repr)
 
 
 def bouncing(restitution, *, python=False, **options):
@@ -53,7 +54,15 @@ def heights(t, restitution):
 
 @pytest.mark.parametrize("python", [False, True])
 @pytest.mark.parametrize("restitution", [1.0, 0.95])
-@pytest.mark.parametrize("method", [HBVM(), HBVM(k=8, s=7, tol=1e-10), Gauss(s=4, tol=1e-10)], ids=repr)
+@pytest.mark.parametrize(
+    "method",
+    [
+        HBVM(), HBVM(k=8, s=7, tol=1e-10), Gauss(s=4, tol=1e-10), HBVM(k=4, s=2, h=0.1), Gauss(s=4, h=0.25),
+        HBVM(k=4, s=2, h=3.0),  # longer than the time between two impacts
+        HBVM(k=8, s=4, h=0.7, solver="newton"),
+    ],
+    ids=repr,
+)  # fmt: skip
 def test_a_ball_bounces(method, restitution, python):
     grid = np.linspace(0.0, END, 101)
     for system in (BALL, PLAIN):
@@ -71,8 +80,9 @@ def test_a_ball_bounces(method, restitution, python):
         assert np.abs(hits.y[:, 0]).max() < 1e-13
 
 
-def test_a_solution_is_known_at_any_time_and_from_its_file(tmp_path):
-    found = integrate(Problem(BALL, y0=[1.0, 0.0], t_end=END), HBVM(), [END / 3, END], events=bouncing(0.95))
+@BOTH
+def test_a_solution_is_known_at_any_time_and_from_its_file(method, tmp_path):
+    found = integrate(Problem(BALL, y0=[1.0, 0.0], t_end=END), method, [END / 3, END], events=bouncing(0.95))
     times = np.linspace(0.0, END, 500)
     assert np.abs(found(times) - heights(times, 0.95)).max() < 1e-12  # measured 8e-14
     hits = found.events["bounce"]
@@ -85,24 +95,28 @@ def test_a_solution_is_known_at_any_time_and_from_its_file(tmp_path):
     assert found.warnings == ()  # the ball has lost energy at the floor, the method none
 
 
-def test_a_ball_that_comes_to_rest_has_a_status():
+@pytest.mark.parametrize(
+    "method", [HBVM(), HBVM(k=4, s=2, h=0.1), Gauss(s=4, h=0.25), HBVM(k=4, s=2, h=3.0)], ids=repr
+)
+def test_a_ball_that_comes_to_rest_has_a_status(method):
     for restitution, end in ((0.9, 19.0), (0.5, 3.0)):
         problem = Problem(BALL, y0=[1.0, 0.0], t_end=100.0)
-        found = integrate(problem, HBVM(), events=bouncing(restitution))
+        found = integrate(problem, method, events=bouncing(restitution))
         assert found.status is Status.STALLED
         assert "accumulate at t = " in found.reason
-        assert abs(found.t_stop - end * math.sqrt(2.0)) < 1e-8  # measured 4e-10
+        assert abs(found.t_stop - end * math.sqrt(2.0)) < 1e-9  # measured 1.3e-10, with fixed steps 1e-12
         assert found.y[:, 0].min() > -1e-12
     stops = Event(lambda q: q[0], direction=-1, then=lambda q: [q[0], 0.0], name="clay")
-    found = integrate(Problem(BALL, y0=[1.0, 0.0], t_end=100.0), HBVM(), events=stops)
+    found = integrate(Problem(BALL, y0=[1.0, 0.0], t_end=100.0), method, events=stops)
     assert found.status is Status.STALLED
     assert abs(found.t_stop - math.sqrt(2.0)) < 1e-14
 
 
-def test_a_kick_that_goes_on_through_the_surface_happens_once():
+@BOTH
+def test_a_kick_that_goes_on_through_the_surface_happens_once(method):
     kick = Event(lambda q: q[0] - 0.5, then=lambda q, p: [q[0], 2.0 * p[0]], name="kick")
     free = Hamiltonian(lambda q, p: p[0] ** 2 / 2, dof=1)
-    found = integrate(Problem(free, q0=[0.0], p0=[1.0], t_end=2.0), HBVM(), [2.0], events=kick)
+    found = integrate(Problem(free, q0=[0.0], p0=[1.0], t_end=2.0), method, [2.0], events=kick)
     assert found.events["kick"].t.tolist() == [0.5]
     assert np.abs(found.y[-1] - [3.5, 2.0]).max() < 1e-14
 
@@ -121,12 +135,13 @@ def billiard(**options):
     return free, walls
 
 
+@BOTH
 @pytest.mark.parametrize("start", [[0.3, 0.4, 0.7, 0.31], [0.5, 0.5, 1.0, 1.0]])
-def test_a_billiard_has_its_walls_in_order_and_corners_at_once(start):
+def test_a_billiard_has_its_walls_in_order_and_corners_at_once(start, method):
     free, walls = billiard()
     watch = Event(lambda y: y[0] - y[1] / 3 - 0.2, name="watch")
     grid = np.linspace(0.0, 40.0, 81)
-    found = integrate(Problem(free, y0=start, t_end=40.0), HBVM(), grid, events=[*walls, watch])
+    found = integrate(Problem(free, y0=start, t_end=40.0), method, grid, events=[*walls, watch])
     unfolded = np.array(start[:2]) + np.multiply.outer(grid, start[2:])
     expected = 1.0 - np.abs(unfolded % 2.0 - 1.0)
     assert found.status is Status.FINISHED
@@ -138,10 +153,11 @@ def test_a_billiard_has_its_walls_in_order_and_corners_at_once(start):
     assert len(found.events["watch"]) == np.count_nonzero(g[1:] * g[:-1] < 0.0)
 
 
-def test_a_terminal_event_ends_before_or_at_an_action():
+@BOTH
+def test_a_terminal_event_ends_before_or_at_an_action(method):
     free, walls = billiard(terminal=3)
     grid = np.linspace(0.0, 40.0, 401)
-    found = integrate(Problem(free, y0=[0.3, 0.4, 0.7, 0.31], t_end=40.0), HBVM(), grid, events=walls)
+    found = integrate(Problem(free, y0=[0.3, 0.4, 0.7, 0.31], t_end=40.0), method, grid, events=walls)
     assert found.status is Status.EVENT
     assert abs(found.t_stop - 4.6 / 0.31) < 1e-13
     assert found.t[-1] <= found.t_stop < found.t[-1] + 0.1
@@ -151,16 +167,18 @@ def test_a_terminal_event_ends_before_or_at_an_action():
     assert len(found.events["bottom"]) == 2
     passing = Event(lambda y: y[0] - 0.9, direction=1, terminal=2, name="passing")
     found = integrate(
-        Problem(free, y0=[0.3, 0.4, 0.7, 0.31], t_end=40.0), HBVM(), grid, events=[*walls[:2], passing]
+        Problem(free, y0=[0.3, 0.4, 0.7, 0.31], t_end=40.0), method, grid, events=[*walls[:2], passing]
     )
     assert abs(found.t_stop - 2.6 / 0.7) < 1e-13
     assert len(found.events["right"]) == 1
 
 
-def test_checkpoints_go_on_bit_for_bit(tmp_path):
+@pytest.mark.parametrize("sample", ["partial", "steps"])
+@BOTH
+def test_checkpoints_go_on_bit_for_bit(method, sample, tmp_path):
     problem = Problem(BALL, y0=[1.0, 0.0], t_end=END)
     grid = np.linspace(0.0, END, 61)
-    whole = integrate(problem, HBVM(), grid, events=bouncing(0.95))
+    whole = integrate(problem, method, grid, sample, events=bouncing(0.95))
     path = Path(tmp_path / "ball.ckpt")
 
     def after(count):
@@ -176,21 +194,22 @@ def test_checkpoints_go_on_bit_for_bit(tmp_path):
     found: Any = None
     for count in (2, 3, 4):
         found = integrate(
-            problem, HBVM(), grid, events=bouncing(0.95), checkpoint=path, every_seconds=0.0, resume=path,
-            progress=after(count),
+            problem, method, grid, sample, events=bouncing(0.95), checkpoint=path, every_seconds=0.0,
+            resume=path, progress=after(count),
         )  # fmt: skip
         assert found.status is Status.INTERRUPTED
     assert 0.0 < found.t_stop < END
-    found = integrate(problem, HBVM(), grid, events=bouncing(0.95), resume=path)
+    found = integrate(problem, method, grid, sample, events=bouncing(0.95), resume=path)
     assert found.status is Status.FINISHED
     assert np.array_equal(found.y, whole.y)
     assert np.array_equal(found.events["bounce"].after, whole.events["bounce"].after)
     with pytest.raises(InputError, match="is a checkpoint of"):
-        integrate(problem, HBVM(), grid, events=bouncing(0.9), resume=path)
+        integrate(problem, method, grid, sample, events=bouncing(0.9), resume=path)
 
 
-def test_pieces_of_a_trajectory_have_the_bits_of_the_whole():
-    program: Any = HBVM().compile(BALL)
+@BOTH
+def test_pieces_of_a_trajectory_have_the_bits_of_the_whole(method):
+    program: Any = method.compile(BALL)
     problem = Problem(BALL, y0=[1.0, 0.0], t_end=END)
     events = {"bounce": bouncing(0.95)}
     start = program.with_events(problem, events)
@@ -207,13 +226,15 @@ def test_pieces_of_a_trajectory_have_the_bits_of_the_whole():
         first, second = second, first
 
 
-def test_trajectories_of_an_ensemble_bounce_one_by_one(tmp_path):
+@BOTH
+def test_trajectories_of_an_ensemble_bounce_one_by_one(method, tmp_path):
     starts = np.stack([np.linspace(0.5, 2.0, 7), np.zeros(7)], axis=1)
     problem = Problem(BALL, y0=[1.0, 0.0], t_end=END)
-    many = integrate_many(problem, HBVM(), starts=starts, times=[7.0, END], events=bouncing(0.95), threads=2)
+    many = integrate_many(problem, method, starts=starts, times=[7.0, END], events=bouncing(0.95), threads=2)
     for i, y0 in enumerate(starts):
-        alone = integrate(Problem(BALL, y0=y0, t_end=END), HBVM(), [7.0, END], events=bouncing(0.95))
+        alone = integrate(Problem(BALL, y0=y0, t_end=END), method, [7.0, END], events=bouncing(0.95))
         assert np.array_equal(many.y[i], alone.y)
+        assert np.array_equal(many.errors()["energy"][i], alone.errors()["energy"])
         assert np.array_equal(many.events[i]["bounce"].after, alone.events["bounce"].after)
     assert many.warnings == [()] * 7
     many.save(tmp_path / "balls.npz")
@@ -221,26 +242,105 @@ def test_trajectories_of_an_ensemble_bounce_one_by_one(tmp_path):
     assert np.array_equal(loaded.events[3]["bounce"].after, many.events[3]["bounce"].after)
 
 
-def test_it_bounces_backwards_and_step_by_step():
-    forth = integrate(Problem(BALL, y0=[1.0, 0.0], t_end=10.0), HBVM(), [10.0], events=bouncing(1.0))
+@BOTH
+def test_it_bounces_backwards_and_step_by_step(method):
+    forth = integrate(Problem(BALL, y0=[1.0, 0.0], t_end=10.0), method, [10.0], events=bouncing(1.0))
     back = Problem(BALL, y0=forth.y[-1], t0=10.0, t_end=0.0)
-    assert np.abs(integrate(back, HBVM(), [0.0], events=bouncing(1.0)).y[-1] - [1.0, 0.0]).max() < 1e-13
-    run: Any = integrators.start(Problem(BALL, y0=[1.0, 0.0], t_end=END), HBVM(), events=bouncing(0.95))
+    assert np.abs(integrate(back, method, [0.0], events=bouncing(1.0)).y[-1] - [1.0, 0.0]).max() < 1e-13
+    run: Any = integrators.start(Problem(BALL, y0=[1.0, 0.0], t_end=END), method, events=bouncing(0.95))
     while run.t < 10.0:
         assert run.step() is Status.RUNNING
         assert run.y[0] > -1e-13
     assert np.abs(run.y - heights(np.array([run.t]), 0.95)[0]).max() < 1e-12
     assert len(run.events["bounce"]) == np.count_nonzero(impacts(0.95)[0] < run.t + 1e-9)
     assert run.events["bounce"].after.shape == run.events["bounce"].y.shape
+    for t in (11.0, 11.001, 20.0):  # within a step, and after impacts
+        assert np.abs(run.until(t) - heights(np.array([t]), 0.95)[0]).max() < 1e-12
+
+
+def test_fixed_steps_are_counted_from_the_event():
+    method, h = Gauss(s=3, h=0.3), 0.3
+    program: Any = method.compile(BALL)
+    problem = Problem(BALL, y0=[1.0, 0.0], t_end=4.0)
+    found = integrate(problem, method, [4.0], "steps", events=bouncing(1.0))
+    impact, second = (np.sqrt(2.0), 3.0 * np.sqrt(2.0))
+    after = impact + h * np.arange(9)
+    expected = np.concatenate([h * np.arange(1, 5), after])
+    assert second > 4.0 > after[-1]
+    assert np.abs(found.t - expected).max() < 1e-14
+    bounce = found.events["bounce"]
+    assert np.array_equal(found.y[4], bounce.after[0])
+    again = program.start(bounce.after[0], problem.par, bounce.t[0]).take(8)
+    assert np.array_equal(again.y, found.y[5:])
+    stepper = program.with_events(problem, {"bounce": bouncing(1.0)})(problem.y0, problem.par, 0.0, 4.0)
+    one_by_one = [stepper.take(n) for n in (1, 2, 5)]  # the event is one of the steps
+    assert np.array_equal(np.concatenate([taken.y for taken in one_by_one]), found.y[:8])
+    assert found.stats.steps == 13
+    marched = program.with_events(problem, {"bounce": bouncing(1.0)})(problem.y0, problem.par, 0.0, 4.0)
+    assert np.array_equal(marched.march(4.0, 6).y, found.y[:6])
+    assert np.array_equal(marched.march(4.0, 100).y, found.y[6:])
+
+
+def test_an_event_in_what_is_left_after_the_last_step_happens():
+    method = HBVM(k=4, s=2, h=1.0)
+    found = integrate(Problem(BALL, y0=[1.0, 0.0], t_end=1.5), method, [1.5], "steps", events=bouncing(1.0))
+    assert np.abs(found.t - [1.0, math.sqrt(2.0)]).max() < 1e-15
+    assert len(found.events["bounce"]) == 1
+
+
+def test_errors_are_those_of_the_integration_and_not_what_events_take():
+    problem = Problem(BALL, y0=[1.0, 0.0], t_end=END)
+    for method in (HBVM(), HBVM(k=4, s=2, h=0.1)):
+        at_impacts = np.append(impacts(0.95)[0], END)  # but for rounding
+        for grid in (np.linspace(0.0, END, 301), at_impacts):
+            found = integrate(problem, method, grid, events=bouncing(0.95))
+            assert found.errors()["energy"].max() < 1e-13  # measured 4e-14
+            assert "energy 5.7e-01" not in str(found)
+            assert "since the last event that changes the state" in str(found)
+        energy = found.invariants()["energy"]
+        assert np.abs(energy[-1] / energy[0] - 0.95**28) < 1e-12  # 15 impacts, from the first
+
+
+def test_a_state_that_is_no_number_names_the_event():
+    problem = Problem(BALL, y0=[1.0, 0.0], t_end=END)
+
+    def python(y):
+        return np.asarray([y[0], float("nan")])
+
+    for then in (lambda y, m: [y[0], m.sqrt(y[1])], python):
+        event = Event(lambda y: y[0], direction=-1, then=then, name="bounce")
+        for method in (HBVM(), HBVM(k=4, s=2, h=0.1)):
+            found = integrate(problem, method, events=event)
+            assert found.status is Status.NOT_FINITE
+            assert (
+                "then of the event 'bounce' returns a number that is not finite at t = 1.41" in found.reason
+            )
+            assert np.isfinite(found.y).all()
+            assert len(found.events["bounce"]) == 0
+
+
+def test_reversible_steps_begin_anew():
+    ball = Hamiltonian(lambda q, p: p[0] ** 2 / 2 + q[0] + q[0] ** 4 / 8, dof=1, name="anharmonic ball")
+    problem = Problem(ball, y0=[1.0, 0.0], t_end=END)
+    found = integrate(problem, Gauss(s=4, tol=1e-9, steps="reversible"), events=bouncing(0.95))
+    exact = integrate(problem, HBVM(), events=bouncing(0.95))
+    assert found.status is Status.FINISHED
+    assert len(found.events["bounce"]) == len(exact.events["bounce"]) == 15
+    assert np.abs(found.y - exact.y).max() < 1e-6  # measured 1e-9
+    uniform = integrate(Problem(BALL, y0=[1.0, 0.0], t_end=END), Gauss(s=4, tol=1e-9, steps="reversible"))
+    assert uniform.status is Status.STEP_UNDERFLOW  # with and without events
+    assert "the time scale of the field, and this one has none at t = 0.0" in uniform.reason
 
 
 def test_what_cannot_be_is_refused_and_what_raises_is_a_status():
     problem = Problem(BALL, y0=[1.0, 0.0], t_end=END)
-    for method in (HBVM(k=4, s=2, h=0.1), LineIntegral(k=4, s=2, tol=1e-8, invariants=["energy"]), Taylor()):
-        with pytest.raises(InputError, match="adaptive step size"):
+    for method in (LineIntegral(k=4, s=2, tol=1e-8, invariants=["energy"]), Taylor()):
+        with pytest.raises(InputError, match="use HBVM or Gauss, or leave out then="):
             integrate(problem, method, events=bouncing(1.0))
     with pytest.raises(InputError, match="then="):
         integrate(problem, HBVM(), events=bouncing(1.0), variations="y0")
+    with pytest.raises(InputError, match="sample='stop' changes"):
+        integrate(problem, HBVM(k=4, s=2, h=0.1), sample="stop", events=bouncing(1.0))
     with pytest.raises(InputError, match="2 numbers, the new state"):
         integrate(problem, HBVM(), events=Event(lambda q: q[0], then=lambda q: [q[0]]))
     with pytest.raises(InputError, match="then=3 of an event"):
