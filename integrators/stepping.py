@@ -107,7 +107,7 @@ class StepperBase:
     """What a function of the user raised, where the status is ``USER_ERROR``."""
     destination: float | None = None
     """Where the whole integration ends, if ``advance`` goes there in pieces."""
-    crawl: StallDetector | None = None
+    detector: StallDetector | None = None
     """Detects stalls on the way to the destination; see `integrators.running.watchdog`."""
 
     def __init__(self, y: Array, t: float):

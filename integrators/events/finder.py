@@ -127,9 +127,6 @@ class EventLog:
         self.terminal, self.stop = kept["terminal"], kept["stop"]
 
 
-Hits = EventLog  # its name in the kernel
-
-
 class Finder(Protocol):
     """A search for events in the steps of one trajectory, at work.
 
@@ -219,9 +216,10 @@ def started_with_events(
     """
     acting = [name for name, event in events.items() if event.then is not None]
     if acting and not (offers(program, Actions) and program.acts):
+        why = ": it conserves invariants of the initial state" if offers(program, Actions) else ""
         raise InputError(
-            f"the event {acting[0]!r} changes the state, which {method!r} does not offer"
-            f"{_refused_action(program, method)}; use HBVM or Gauss, or leave out then=."
+            f"the event {acting[0]!r} changes the state, which {method!r} does not offer{why}; "
+            "use HBVM or Gauss, or leave out then=."
         )
     if not offers(program, Events):
         raise InputError(
@@ -229,11 +227,3 @@ def started_with_events(
             "finding them takes; use HBVM, Gauss, LineIntegral or Taylor."
         )
     return program.with_events(problem, events)
-
-
-def _refused_action(program: Any, method: MethodBase) -> str:
-    """Return why events cannot change the state, if there is more to say."""
-    if not offers(program, Actions):
-        return ""
-    conserved = ", ".join(method.conserved(program.system))
-    return f" for {program.system.name}: it conserves {conserved or 'invariants'}, which the event may change"

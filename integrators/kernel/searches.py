@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from integrators.events.event import Event
-from integrators.events.finder import Hits
+from integrators.events.finder import EventLog
 from integrators.kernel.context import DONE
 from integrators.kernel.events.engine import look
 from integrators.kernel.events.functions import Action, EventFunction
@@ -53,7 +53,7 @@ class LastingSearch(KernelSearch):
         memory.hits = memory.evaluations = memory.iterations = memory.partial_steps = 0
         for name in FRESH:
             getattr(memory, name)[:] = 0
-        self._hits = Hits(events, memory.sign, self._dim, memory.parameters)
+        self._hits = EventLog(events, memory.sign, self._dim, memory.parameters)
         self._make_room(self._first_room)
         if self._look(START) != DONE:
             error = self._error

@@ -44,7 +44,7 @@ from integrators.protocol import SAMPLINGS, Array, Samples, Stats, Status, UserE
 from integrators.refusals import check_times, one_thread
 from integrators.running.checkpoints import Identity
 from integrators.running.times import Counts
-from integrators.running.watchdog import Crawl
+from integrators.running.watchdog import StallDetector
 from problems.errors import InputError, unknown
 from problems.problem import System
 
@@ -149,7 +149,7 @@ class HBVMStepper(ABC):
     samplings: tuple[str, ...] = SAMPLINGS
     destination: float | None = None
     """Where the whole integration ends, if ``advance`` goes there in pieces."""
-    crawl: Crawl | None = None
+    detector: StallDetector | None = None
     """What watches the way to the destination; see `integrators.running.watchdog`."""
     time_limit = math.inf  # seconds after which ``advance`` returns what it has
     variations: Array | None = None

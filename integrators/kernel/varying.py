@@ -24,7 +24,7 @@ from integrators.kernel.stepper import Ended, HBVMStepper, Program
 from integrators.options import SHORTEST, SMALLEST
 from integrators.protocol import Array, Samples, Status
 from integrators.refusals import one_thread
-from integrators.running.watchdog import crawl
+from integrators.running.watchdog import stall_detector
 from problems.errors import InputError
 
 LOOK_AHEAD = 2000  # steps of the look ahead, at most
@@ -170,7 +170,7 @@ class AdaptiveStepper(HBVMStepper):
 
     def _to(self, times: Array, between: int) -> Samples:
         """Make the samples, piece by piece from one breakpoint to the next."""
-        self._watch = crawl(self, self.t, float(times[-1]))
+        self._watch = stall_detector(self, self.t, float(times[-1]))
         if not self._breakpoints.size:
             states, outcome, why = self._fill(between, times)
             return self._samples(times[: len(states)], states, outcome, why)
@@ -333,7 +333,7 @@ class AdaptiveStepper(HBVMStepper):
             self._vectors.note_now(self.t)
         self._face(end)
         outcome, steps, why, ctx = BUDGET, 0, None, self._context
-        self._watch = crawl(self, self.t, end)
+        self._watch = stall_detector(self, self.t, end)
         while outcome == BUDGET and (limit is None or steps < limit) and why is None:
             # fewer come where the implicit solver is made
             n = self._budget(None if limit is None else limit - steps)

@@ -120,7 +120,7 @@ class Watched(Destination, Protocol):
         Its detector, if it has a destination; kept here from piece to piece.
     """
 
-    crawl: StallDetector | None
+    detector: StallDetector | None
 
 
 def stall_detector(stepper: Watched, t: float, end: float) -> StallDetector:
@@ -131,9 +131,6 @@ def stall_detector(stepper: Watched, t: float, end: float) -> StallDetector:
     """
     if stepper.destination is None:
         return StallDetector(t, end)
-    if stepper.crawl is None:
-        stepper.crawl = StallDetector(t, stepper.destination)
-    return stepper.crawl
-
-
-Crawl, crawl = StallDetector, stall_detector  # their names in the kernel
+    if stepper.detector is None:
+        stepper.detector = StallDetector(t, stepper.destination)
+    return stepper.detector

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from integrators.events.event import Event
-from integrators.events.finder import Hits
+from integrators.events.finder import EventLog
 from integrators.kernel.context import DONE, Context
 from integrators.kernel.events.engine import look
 from integrators.kernel.events.functions import Action, EventFunction
@@ -102,7 +102,7 @@ class KernelSearch:
         memory.directions[:] = [event.direction for event in events.values()]
         memory.limits[:] = [event.last for event in events.values()]
         memory.actions[:] = [actions[name].address if name in actions else 0 for name in events]
-        self._hits = Hits(events, memory.sign, self._dim, memory.parameters)
+        self._hits = EventLog(events, memory.sign, self._dim, memory.parameters)
         self._make_room(self._first_room)
         self.trouble: tuple[Status, str, Exception | None] | None = None
         if self._look(START) != DONE:
@@ -183,7 +183,7 @@ class KernelSearch:
         self.trouble = Status.STALLED, f"{reason} Events {known}", None
 
     @property
-    def hits(self) -> Hits:
+    def hits(self) -> EventLog:
         """What has happened."""
         n, self._memory.hits = self._memory.hits, 0
         self._hits.take(

@@ -78,7 +78,8 @@ def test_a_reduction_of_own_times_goes_on_from_a_checkpoint(tmp_path: Path) -> N
     broken = integrate_many(PENDULUM, METHOD, **given, checkpoint=file, progress=stop)
     assert Status.INTERRUPTED in broken.status
     whole, resumed = (
-        integrate_many(PENDULUM, METHOD, **given, **more) for more in ({}, {"resume": file, "checkpoint": file})
+        integrate_many(PENDULUM, METHOD, **given, **more)
+        for more in ({}, {"resume": file, "checkpoint": file})
     )
     assert np.array_equal(resumed.reduced["mean"], whole.reduced["mean"])
     assert np.array_equal(resumed.t, whole.t)
@@ -105,5 +106,7 @@ def test_workers_find_events(times: Any) -> None:
 def test_processes_find_events() -> None:
     alone = integrate_many(PENDULUM, METHOD, starts=STARTS, times=[5.0], events=TURN)
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
-        made = integrate_many(PENDULUM, METHOD, starts=STARTS, times=[5.0], events=TURN, executor=pool, piece=4)
+        made = integrate_many(
+            PENDULUM, METHOD, starts=STARTS, times=[5.0], events=TURN, executor=pool, piece=4
+        )
     _same(made, alone)
