@@ -8,6 +8,7 @@ import os
 import sys
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict
+from datetime import UTC, datetime
 from importlib import import_module
 from multiprocessing import get_context
 from pathlib import Path
@@ -30,24 +31,33 @@ This page is written by `make examples`.
 """
 
 
-def compared(name: str) -> Comparison:
-    """Return what a script measures."""
-    return import_module(name).compare()
+def compared(name: str) -> tuple[Comparison, tuple[float, float] | None]:
+    """Return what a script measures, and what else the machine did: other processes, and steal time."""
+    from hbvm_bench.measure.timing import busy, load_between
+
+    before = busy()
+    comparison = import_module(name).compare()
+    load = load_between(before, busy())
+    return comparison, None if load is None else (load.others, load.stolen)
 
 
 def measure() -> None:
-    """Run all, and store what they measure with the kind of machine and what else it did."""
+    """Run all, and store what they measure with the day, the kernel, the kind of machine and its load."""
+    from hbvm_bench.campaign.identity import kernel_digest
     from hbvm_bench.measure import machine
 
     busy = os.getloadavg()[0]
-    results = {}
+    day, results, loads = datetime.now(UTC).date().isoformat(), {}, {}
     with ProcessPoolExecutor(1, mp_context=get_context("spawn"), max_tasks_per_child=1) as pool:
         for name in TASKS:
-            results[name] = pool.submit(compared, name).result()
+            results[name], loads[name] = pool.submit(compared, name).result()
             print(results[name], end="\n\n", flush=True)
     stored = {
         "machine": machine.sentence(machine.describe(measure=True)),
         "busy": round(busy, 2),
+        "day": day,
+        "kernel": kernel_digest(),
+        "loads": {name: load for name, load in loads.items() if load is not None},
         "tasks": {name: asdict(result) for name, result in results.items()},
     }
     STORED.write_text(json.dumps(stored, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
@@ -57,6 +67,12 @@ def page() -> str:
     """Return the page of what is stored."""
     stored = json.loads(STORED.read_text(encoding="utf-8"))
     lines = [INTRODUCTION, stored["machine"]]
+    if "day" in stored:
+        from hbvm_bench.report.provenance import measured_on
+        from hbvm_bench.store.records import Load
+
+        loads = [Load(others=others, stolen=stolen) for others, stolen in stored["loads"].values()]
+        lines.append(measured_on(stored["day"], stored["kernel"], loads))
     if stored["busy"] > BUSY:
         lines.append(
             f"**Other work ran on the machine ({stored['busy']} processes at the start): these times are "

@@ -10,6 +10,7 @@ import argparse
 import gc
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from functools import partial
 from timeit import timeit
 from typing import Any
@@ -19,10 +20,13 @@ from numpy.typing import NDArray
 
 import integrators
 import problems
+from hbvm_bench.campaign.identity import kernel_digest
 from hbvm_bench.measure import machine
 from hbvm_bench.measure.measured import POSITION, position_error
-from hbvm_bench.measure.timing import interleaved
+from hbvm_bench.measure.timing import busy, interleaved, load_between
 from hbvm_bench.report.markdown import printed
+from hbvm_bench.report.provenance import measured_on
+from hbvm_bench.store.records import Load
 from hbvm_bench.summaries.table import Table
 from problems.catalogue.pendulum import exact_state
 from problems.problem import Problem
@@ -55,8 +59,8 @@ class Cost:
     seconds: Array
 
 
-def measure(host: str, rounds: int) -> list[Cost]:
-    """Measure the rows of one host: ``"scipy"``, ``"diffrax"`` or ``"rebound"``.
+def measure(host: str, rounds: int) -> tuple[list[Cost], Load | None]:
+    """Measure the rows of one host, ``"scipy"``, ``"diffrax"`` or ``"rebound"``, and the load meanwhile.
 
     Raises
     ------
@@ -67,12 +71,14 @@ def measure(host: str, rounds: int) -> list[Cost]:
     first = [run() for _, run in rows]
 
     samples = [partial(timeit, run, setup=gc.enable, number=1) for _, run in rows]
+    before = busy()
     seconds = np.array(interleaved(samples, rounds, order="as given"))
+    load = load_between(before, busy())
     energies = [float(problem.errors(y)["energy"].max()) for y in first]
     true = np.stack([problem.y0, reference])
     positions = [float(position_error(problem, (y[-1] - reference)[None], true)[0]) for y in first]
     names = (name for name, _ in rows)
-    return [Cost(*row) for row in zip(names, energies, positions, seconds, strict=True)]
+    return [Cost(*row) for row in zip(names, energies, positions, seconds, strict=True)], load
 
 
 def table(rows: list[Cost]) -> Table:
@@ -307,15 +313,18 @@ def main() -> None:
     parser.add_argument("host", choices=[*HOSTS, "leak"])
     parser.add_argument("--rounds", type=int, default=5, help="how often each row is timed")
     parser.add_argument("--span", type=float, default=1e5, help="time units of the leak")
-    asked = parser.parse_args()
+    asked, today = parser.parse_args(), datetime.now(UTC).date().isoformat()
     if asked.host == "leak":
         print("| t | DOP853 | HBVM |\n|--:|--:|--:|")
         for t, errors in leak(asked.span):
             print(f"| {t:.0f} | {errors['DOP853']:.2e} | {errors['HBVM']:.2e} |", flush=True)
+        print(f"\n{measured_on(today, kernel_digest(), [])}")
         return
-    print(printed(table(measure(asked.host, asked.rounds))))
+    rows, load = measure(asked.host, asked.rounds)
+    print(printed(table(rows)))
     print(f"\n{POSITION} Here those are its start and its end.")
     print(f"\n{machine.sentence(machine.describe(measure=True))}")
+    print(f"\n{measured_on(today, kernel_digest(), [load] if load else [])}")
 
 
 if __name__ == "__main__":

@@ -266,10 +266,13 @@ def _compilation(run: Timeable) -> Compile:
 
 
 def busy() -> tuple[float, float, float, float]:
-    """Return, in seconds, the busy and steal time of all cores, our own, and the wall clock's."""
+    """Return, in seconds, the busy and steal time of all cores, our own, and the wall clock's.
+
+    Our own is that of this process and of those that it started and that have ended.
+    """
     all_, own = psutil.cpu_times(), os.times()
     spent = sum(getattr(all_, name, 0.0) for name in ("user", "nice", "system", "irq", "softirq"))
-    return spent, stolen(), own.user + own.system, time.monotonic()
+    return spent, stolen(), sum(own[:4]), time.monotonic()
 
 
 def stolen() -> float:

@@ -27,7 +27,6 @@ LEAD = (
     "running anything; git ignores them, but for sitnikov's."
 )
 WIDTH = 360  # pixels of a thumbnail
-DIGITS = 12  # of a digest
 LONGEST = 400  # characters of a description
 CHECKS = ("smoke",)  # campaigns that ask whether everything works, and have no report
 RACE, AVX2 = "race", "-avx2"  # how the kind of a processor ends, where code was restricted to AVX2
@@ -127,7 +126,7 @@ def _kinds(path: Path) -> list[str]:
 def _measured(records: Sequence[Record]) -> tuple[str, ...]:
     described = Kept.machine_of(records)
     names = dict.fromkeys((str(described.get("processor", "unknown")), machine.kind(described)))
-    kernels = sorted({record.kernel[:DIGITS] for record in records if record.kernel})
+    kernels = sorted({record.kernel[: provenance.DIGITS] for record in records if record.kernel})
     return (
         provenance.days(records),
         ", ".join(names),

@@ -143,14 +143,17 @@ def disturbed(records: Sequence[Record]) -> list[str]:
 
 def beside(records: Sequence[Record]) -> list[str]:
     """Return a sentence on what else ran while interleaved times were taken, where that was looked at."""
-    if not (loads := _loads(records)):
-        return []
+    return [other_work(loads)] if (loads := _loads(records)) else []
+
+
+def other_work(loads: Sequence[Load]) -> str:
+    """Say what else ran while times were taken, from at least one look at it."""
     others, stolen = (_shares([getattr(load, name) for load in loads]) for name in ("others", "stolen"))
-    doubt = "; the times are doubtful" if busy(records) else ""
-    return [
+    doubt = "; the times are doubtful" if any(map(_doubtful, loads)) else ""
+    return (
         f"While times were taken, other processes used {others} of a core, and the steal time was "
         f"{stolen} of one{doubt}."
-    ]
+    )
 
 
 def shares(records: Sequence[Record]) -> tuple[str, str]:
@@ -189,7 +192,11 @@ def by_compilation(record: Record) -> list[float]:
 
 def busy(records: Sequence[Record]) -> bool:
     """Whether the machine had so much other work that interleaved times are doubtful."""
-    return any(max(load.others, load.stolen) > OTHER_WORK for load in _loads(records))
+    return any(map(_doubtful, _loads(records)))
+
+
+def _doubtful(load: Load) -> bool:
+    return max(load.others, load.stolen) > OTHER_WORK
 
 
 def _loads(records: Sequence[Record]) -> list[Load]:

@@ -53,6 +53,20 @@ def test_the_page_of_tasks_is_what_is_stored(monkeypatch):
     assert run_all.page() == run_all.PAGE.read_text(encoding="utf-8")
 
 
+def test_the_page_of_tasks_says_when_with_what_kernel_and_beside_what_load(monkeypatch, tmp_path):
+    monkeypatch.syspath_prepend(str(SCRIPTS))
+    import run_all
+
+    stored = json.loads(run_all.STORED.read_text(encoding="utf-8"))
+    monkeypatch.setattr(run_all, "STORED", tmp_path / "measured.json")
+    more = {"day": "2026-11-25", "kernel": "0123456789abcdef", "loads": {"short": [0.01, 0.0]}}
+    run_all.STORED.write_text(json.dumps(stored | more), encoding="utf-8")
+    assert (
+        "\n\nMeasured on 2026-11-25 with the kernel 0123456789ab. While times were taken, other processes "
+        "used 1% of a core, and the steal time was 0% of one.\n"
+    ) in run_all.page()
+
+
 # Its reference is computed by two methods, half a minute of compiling (that of the tutorial is stored);
 # campaign.py starts seven processes; bodies.py compiles for 14 s, and XLA does in fit.py for 5.
 SLOW = {"own_campaign.py", "campaign.py", "bodies.py", "fit.py"}

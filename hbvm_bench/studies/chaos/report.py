@@ -322,6 +322,10 @@ def _busy(shares: Sequence[float]) -> str:
 
 def _times(measured: dict[str, exponents.Measured]) -> Table:
     rows = []
+    summed, timed = "divergence of the field, where that is a constant", ""
+    if any(here.divergence is not None for here in measured.values()):  # not in older results
+        summed = "mean divergence of the field along the trajectory"
+        timed = "; where the divergence is not constant, ours contain its integration"
     for name, here in measured.items():
         known, load_ = SYSTEMS[name], (here.others, here.stolen)
         divergence = known.divergence if here.divergence is None else here.divergence
@@ -345,9 +349,8 @@ def _times(measured: dict[str, exponents.Measured]) -> Table:
             *("time, ours", "time, heyoka"),
         ),
         rows,
-        "Sum off by: the sum of our exponents less the mean divergence of the field along the trajectory. "
-        "Times: median of whole runs with all exponents, without compiling; where the divergence is not "
-        "constant, ours contain its integration."
+        f"Sum off by: the sum of our exponents less the {summed}. Times: median of whole runs with all "
+        f"exponents, without compiling{timed}."
         + _busy([max(here.others, here.stolen) for here in measured.values()]),
         words=(0,),
         key="exponents-times",

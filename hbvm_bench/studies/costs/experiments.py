@@ -124,20 +124,12 @@ def _on_a_core(samples: dict[str, Callable[[], float]], rounds: int) -> Times:
 
 def _taken(samples: dict[str, Callable[[], float]], rounds: int) -> Times:
     """Take the samples in turn, and look at what else the machine does."""
-    before, children = busy(), _children()
+    before = busy()
     seconds = interleaved([*samples.values()], rounds)
-    after = busy()
-    load, children = load_between(before, after), _children() - children
+    load = load_between(before, busy())
     if load is None:
         raise InputError("the clock stood still while times were taken.")
-    others = max(load.others - children / (after[-1] - before[-1]), 0.0)
-    return Times(dict(zip(samples, seconds, strict=True)), round(others, 3), load.stolen)
-
-
-def _children() -> float:
-    """Return the processor seconds of processes that this one started and that have ended."""
-    spent = os.times()
-    return spent.children_user + spent.children_system
+    return Times(dict(zip(samples, seconds, strict=True)), load.others, load.stolen)
 
 
 PROGRAM = """

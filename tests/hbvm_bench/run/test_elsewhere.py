@@ -113,6 +113,13 @@ def test_where_no_core_can_be_bound_all_are_used(monkeypatch):
         assert psutil.Process().cpu_affinity() == before
 
 
+def test_the_work_of_processes_that_this_one_started_is_no_other_work():
+    before = timing.busy()
+    spin = "import time\nwhile time.process_time() < 0.5: pass"
+    subprocess.run([sys.executable, "-c", spin], check=True)
+    assert timing.busy()[2] - before[2] > 0.45
+
+
 def test_what_the_system_does_not_tell_is_no_finding_of_good_news(monkeypatch):
     times = type("Times", (), {"user": 1.0, "system": 2.0, "idle": 3.0})()  # as on macOS and Windows
     monkeypatch.setattr(psutil, "cpu_times", lambda: times)

@@ -90,6 +90,8 @@ def test_the_sum_is_compared_with_the_mean_divergence_where_that_is_not_constant
     assert report._times({"rossler": older}).rows[0][5] == NONE
     newer = replace(older, divergence=-5.33 + 1e-12)
     assert report._times({"rossler": newer}).rows[0][5] == "1e-12"
+    assert "where that is a constant" in report._times({"rossler": older}).note
+    assert "ours contain its integration" in report._times({"rossler": newer}).note
     lorenz = made_up("lorenz", 0.9, 0.9, -41 / 3 + 1e-12)
     assert report._times({"lorenz": lorenz}).rows[0][5] == "1e-12"
 
