@@ -84,7 +84,7 @@ def calls(rounds: int) -> Times:
 
     for text in CALLED:
         _finished(integrate(problem, make_method(text), [SHORT]))
-    return _on_a_core({text: partial(sample, text) for text in CALLED}, rounds)
+    return taken_on_a_core({text: partial(sample, text) for text in CALLED}, rounds)
 
 
 def steps(rounds: int) -> Times:
@@ -102,7 +102,7 @@ def steps(rounds: int) -> Times:
         whole = _finished(integrate(problem, make_method(text), [LONG]))
         return max(stepped - (time.perf_counter() - begun) / whole.stats.steps, 0.0)
 
-    return _on_a_core({text: partial(sample, text) for text in STEPPED}, rounds)
+    return taken_on_a_core({text: partial(sample, text) for text in STEPPED}, rounds)
 
 
 def first_results(rounds: int) -> Times:
@@ -115,7 +115,7 @@ def first_results(rounds: int) -> Times:
     return _taken({text: partial(sample, text) for text in FIRST}, rounds)
 
 
-def _on_a_core(samples: dict[str, Callable[[], float]], rounds: int) -> Times:
+def taken_on_a_core(samples: dict[str, Callable[[], float]], rounds: int) -> Times:
     """Take samples in this process, on one core, after a round that is left out."""
     with machine.staying_on_a_core(), no_collection():
         interleaved([*samples.values()], 1)

@@ -15,6 +15,7 @@ from hbvm_bench.report.page import block
 from hbvm_bench.store.records import Record
 from hbvm_bench.studies.computations import Part, Results, Task, computing, load, sections_of
 from hbvm_bench.studies.costs import experiments
+from hbvm_bench.studies.costs.beside_c import ECCENTRICITY, IN_C, OURS, SOURCE, STEP, BesideC, beside_c
 from hbvm_bench.studies.costs.experiments import CALLED, FIRST, ON_LATTICES, STEPPED, Iterations, Times
 from hbvm_bench.summaries import compilations, outcomes, standings
 from hbvm_bench.summaries.goals import other_work, ratio_text
@@ -30,6 +31,7 @@ METRICS = ("warm_seconds", "steps", "evaluations", "energy_max", "position_end")
 SIZES, QUICK_SIZES = (10, 100, 1000, 4000), (10, 100)
 ROUNDS, QUICK_ROUNDS = 40, 3
 FRESH, QUICK_FRESH = 3, 1
+C_STEPS, QUICK_C_STEPS = 100_000, 2_000  # long enough for the overhead of a call, some 50 µs, not to count
 LATTICE_END, QUICK_END = 10.0, 2.0
 
 
@@ -76,6 +78,7 @@ def parts(*, quick: bool) -> list[Part]:
     """Return what is computed and shown beside the cases, in a quick run or a whole one."""
     sizes, t_end = (QUICK_SIZES, QUICK_END) if quick else (SIZES, LATTICE_END)
     rounds, fresh = (QUICK_ROUNDS, QUICK_FRESH) if quick else (ROUNDS, FRESH)
+    c_task = Task("times", partial(beside_c, QUICK_C_STEPS if quick else C_STEPS, rounds), timed=True)
     lattices = [Task(f"of {n}", partial(experiments.iterations, n, t_end), cost=n / 100) for n in sizes]
 
     def on_lattices(results: Results) -> list[Maker]:
@@ -91,6 +94,13 @@ def parts(*, quick: bool) -> list[Part]:
         Part("lattices", "Iterations on a lattice", lattices, _none, on_lattices),
         measured("calls", "A second call of integrate", experiments.calls, rounds, calls),
         measured("steps", "run.step() beyond the kernel's step", experiments.steps, rounds, steps),
+        Part(
+            "c",
+            "Kepler's problem beside C",
+            [c_task],
+            _none,
+            lambda results: [("the steps in C", lambda: in_c(results["times"]))],
+        ),
         measured("first", "The first result of a fresh process", experiments.first_results, fresh, fresh_),
     ]
 
@@ -262,6 +272,44 @@ def fresh_(times: Times) -> Table:
         "s",
         "From the start of Python to the end of `integrate(problems.load('kepler'), method)`, with all "
         "imports; the caches of compiled code are empty.",
+    )
+
+
+def in_c(found: BesideC) -> Table | Note:
+    """Return times, iterations and errors beside the same algorithm in C, or why there are none."""
+    if found.times is None:
+        return Note(f"Not run: {found.compiler}.")
+    most = max(found.times.others, found.times.stolen)
+    verdict = f"not judged: other work took {most:.0%} of a core" if most > OTHER_WORK else "judged"
+    ours = found.times.seconds[OURS]
+    rows = []
+    for name in (OURS, IN_C):
+        outcome, seconds = found.outcomes[name], found.times.seconds[name]
+        nanoseconds = Spread.from_samples([1e9 * second for second in seconds])
+        ratio = Spread.from_samples([second / our for second, our in zip(seconds, ours, strict=True)])
+        rows.append(
+            (
+                name,
+                f"{nanoseconds.median:.1f}",
+                f"{1e9 * min(seconds):.1f}",
+                "1" if name == OURS else ratio_text(ratio),
+                f"{outcome.iterations / outcome.steps:.3f}",
+                f"{outcome.energy:.1e}",
+                f"{outcome.position:.1e}",
+                verdict,
+            )
+        )
+    steps = found.outcomes[OURS].steps
+    return Table(
+        f"A step of Gauss(8) on Kepler's problem, e = {ECCENTRICITY:g}, beside the same algorithm in C",
+        ("code", "median (ns)", "best", f"× {OURS}", "iterations a step", "energy", "position", "verdict"),
+        rows,
+        f"{steps:,} steps of length {STEP:g} in the second-order form, in turn; errors at the end. Both have "
+        "the same tables, first stages, stopping rule and compensated update; "
+        f"`{SOURCE.name}` by {found.compiler}. Ratios: the median within each round, in brackets the "
+        "quartiles.",
+        words=(0, 7),
+        key="costs-c",
     )
 
 

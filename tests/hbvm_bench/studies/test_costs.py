@@ -1,5 +1,7 @@
 """The campaign ``costs``: its families stay apart, and what a busy machine measured is not judged."""
 
+from functools import partial
+
 import pytest
 from msgspec.structs import replace
 
@@ -7,12 +9,14 @@ from hbvm_bench.campaign.file import load
 from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.cli import main
 from hbvm_bench.reference import solutions
+from hbvm_bench.report.document import Note
 from hbvm_bench.store.records import Load
 from hbvm_bench.studies.computations import packed, unpacked
-from hbvm_bench.studies.costs import experiments, report
+from hbvm_bench.studies.costs import beside_c, experiments, report
 from hbvm_bench.studies.costs.experiments import Iterations, Times
 from hbvm_bench.studies.costs.report import Ratio
 from hbvm_bench.summaries.points import PROJECTION
+from hbvm_bench.summaries.table import Table
 from tests.hbvm_bench import made_up_run
 
 DEFAULT = made_up_run.record("HBVM(tol=3e-16)", [1.0, 2.0, 4.0])
@@ -87,6 +91,36 @@ def test_what_came_out_is_read_again():
     assert unpacked(packed(times), task.run) == times
 
 
+def test_the_same_algorithm_in_c_needs_as_many_iterations_and_has_errors_of_the_same_size():
+    if not beside_c.compiler():
+        pytest.skip("this machine has no C compiler")
+    found = beside_c.beside_c(2000, 2)
+    assert found.times is not None, found.compiler
+    ours, in_c = found.outcomes[beside_c.OURS], found.outcomes[beside_c.IN_C]
+    assert abs(in_c.iterations - ours.iterations) <= 0.005 * ours.iterations  # measured 2e-3 and less
+    for outcome in (ours, in_c):
+        assert outcome.energy < 5e-15  # measured 1e-15
+        assert outcome.position < 1e-12  # measured 1e-13
+    table = report.in_c(found)
+    assert isinstance(table, Table)
+    assert [row[0] for row in table.rows] == [beside_c.OURS, beside_c.IN_C]
+    assert "-O3 -march=native" in table.note
+    assert unpacked(packed(found), partial(beside_c.beside_c, 2000, 2)) == found
+
+
+@pytest.mark.parametrize(
+    ("command", "words"), [("no-such-compiler", "no C compiler"), ("false", "no C compiler that compiles")]
+)
+def test_without_a_c_compiler_the_block_says_so(monkeypatch, command, words):
+    monkeypatch.setenv("CC", command)
+    found = beside_c.beside_c(100, 1)
+    assert (found.outcomes, found.times) == ({}, None)
+    note = report.in_c(found)
+    assert isinstance(note, Note)
+    assert words in note.text
+    assert unpacked(packed(found), partial(beside_c.beside_c, 100, 1)) == found
+
+
 @pytest.mark.slow
 def test_a_quick_run_computes_and_draws_everything(tmp_path):
     command = ["run", "costs", "--quick", "--jobs", "1", "--out", str(tmp_path), "--report", str(tmp_path)]
@@ -94,5 +128,10 @@ def test_a_quick_run_computes_and_draws_everything(tmp_path):
     text = (tmp_path / "report.md").read_text(encoding="utf-8")
     assert "Time relative to HBVM(): HBVM(projection='energy')" in text
     assert "Kepler's problem, e = 0.6" in text
-    for title in ("Iterations on a lattice", "A second call of integrate", "The first result of a fresh"):
+    for title in (
+        "Iterations on a lattice",
+        "A second call of integrate",
+        "Kepler's problem beside C",
+        "The first result of a fresh",
+    ):
         assert title in text
