@@ -82,7 +82,11 @@ def from_sympy(
         try:
             right = [sympy.sympify(component) for component in expression.rhs()]
         except ValueError as error:
-            formed = "form_lagranges_equations()" if "Lagrange" in type(expression).__name__ else "kanes_equations()"
+            formed = (
+                "form_lagranges_equations()"
+                if "Lagrange" in type(expression).__name__
+                else "kanes_equations()"
+            )
             raise InputError(
                 f"the equations of this {type(expression).__name__} are not formed; call its {formed} first."
             ) from error

@@ -200,8 +200,8 @@ def started_with_events(
     if acting and not (offers(program, Actions) and program.acts):
         why, instead = _refused_action(program, method)
         raise InputError(
-            f"the event {acting[0]!r} changes the state, which {method!r} does not offer{why}; use {instead}, "
-            "or leave out then=."
+            f"the event {acting[0]!r} changes the state, which {method!r} does not offer{why}; "
+            f"use {instead}, or leave out then=."
         )
     if not offers(program, Events):
         raise InputError(
@@ -217,7 +217,7 @@ def _refused_action(program: Any, method: MethodBase) -> tuple[str, str]:
     if offers(program, Actions):
         conserved = ", ".join(method.conserved(program.system))
         return (
-            f" for {program.system.name}: it conserves {conserved or 'invariants'}, which the event may change",
+            f" for {program.system.name}: it conserves {conserved or 'invariants'}, and the event may not",
             "Gauss(s=4, tol=1e-12)",
         )
     if getattr(method, "tol", None) is None and getattr(method, "h", None) is not None:

@@ -248,7 +248,10 @@ class CVODEStepper(StepperBase):
             return False
         if result.t == before:
             self._fail(
-                Status.STEP_UNDERFLOW, before, self._yn, f"CVODE's steps at t = {before!r} are too short to change t."
+                Status.STEP_UNDERFLOW,
+                before,
+                self._yn,
+                f"CVODE's steps at t = {before!r} are too short to change t.",
             )
             return False
         self._stats.steps += 1

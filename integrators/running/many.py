@@ -114,13 +114,14 @@ def integrate_many(
     reduce : mapping of str to Reduction, optional
         What to keep in place of the states, by name: see `integrators.reduce`. Of the states only the last
         ones are kept. With times of their own a reduction over trajectories takes the first of each
-        trajectory's times together, the second, and so on; with events the samples until a terminal one. A mean depends on ``piece`` in its last digits; nothing depends on threads or workers.
+        trajectory's times together, the second, and so on; with events it takes the samples until a terminal
+        one. A mean depends on ``piece`` in its last digits; nothing depends on threads or workers.
     variations : array_like, shape (dim, k) or (n, dim, k), or str, or sequence of str, optional
         As for `integrate`, at the start of each trajectory, or tangent vectors of each: ``variations`` of
         the result has the shape (n, m, dim, k). Trajectories then go one by one, or one in each thread.
     executor : concurrent.futures.Executor, optional
         Who integrates: a ``ProcessPoolExecutor``, ``dask.distributed.Client().get_executor()``, ... A piece
-        whose worker dies is sent once more; if that fails, its trajectories are ``INTERRUPTED``. The functions
+        whose worker dies is sent once more; if that fails, its trajectories are ``INTERRUPTED``. Functions
         of events are sent by name, so they must be those of a module.
     piece : int, optional
         Trajectories that are integrated together: with ``executor`` by default a 64th of all, between 1 and

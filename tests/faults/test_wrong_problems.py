@@ -13,7 +13,13 @@ import problems
 from integrators import HBVM, Event, Gauss, Run, Taylor, integrate, to_rebound
 
 SYSTEM = problems.Hamiltonian(lambda q, p: p[0] ** 2 / 2 + q[0] ** 2 / 2, dof=1)
-WORDS = {"indicator": "megno", "problem": SYSTEM, "method": HBVM(), "method_of": HBVM, "steps": [0.1, 0.2, 0.4]}
+WORDS = {
+    "indicator": "megno",
+    "problem": SYSTEM,
+    "method": HBVM(),
+    "method_of": HBVM,
+    "steps": [0.1, 0.2, 0.4],
+}
 RECORDS = {"Run", "Solution", "Solutions", "PeriodicOrbit"}  # what functions return
 SKIPPED = (".kernel", ".peers", ".plugins.diffrax", "._")
 
@@ -101,7 +107,11 @@ def test_sympy_takes_single_symbols_and_says_that_equations_are_not_formed() -> 
     [
         ("henon_heiles", Gauss(s=2, h=0.1), "shorten a step of its fixed length; use HBVM or Gauss with an"),
         ("henon_heiles", Taylor(), "does not offer; use HBVM or Gauss with an adaptive step size"),
-        ("rigid_body", HBVM(), r"conserves .*energy.*, which the event may change; use Gauss\(s=4, tol=1e-12\)"),
+        (
+            "rigid_body",
+            HBVM(),
+            r"conserves .*energy.*; use Gauss\(s=4, tol=1e-12\)",
+        ),
     ],
 )
 def test_an_action_is_refused_with_the_reason(problem: str, method: Any, reason: str) -> None:

@@ -188,7 +188,10 @@ class AdaptiveStepper(RestorableStepper):
             )
         elif code == solve.OTHER:
             self._fail(
-                Status.NOT_FINITE, reached, np.asarray(y), f"diffrax ended without success at t = {reached!r}."
+                Status.NOT_FINITE,
+                reached,
+                np.asarray(y),
+                f"diffrax ended without success at t = {reached!r}.",
             )
         return reached, np.asarray(y), code
 

@@ -407,7 +407,9 @@ class TaylorStepper(RestorableStepper):
         self._stats.extra["side_steps"] += 1
 
     def _broken(self, t: float, y: Array) -> None:
-        self._fail(Status.NOT_FINITE, t, y, f"heyoka met a state that is not finite in the step from t = {t!r}.")
+        self._fail(
+            Status.NOT_FINITE, t, y, f"heyoka met a state that is not finite in the step from t = {t!r}."
+        )
 
     def _save(self) -> Any:
         return copy.copy(self._ta), self._sign, self._stepped

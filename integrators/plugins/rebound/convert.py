@@ -120,9 +120,13 @@ def to_rebound(
 
     if isinstance(problem, Solution):
         if y is not None or t is not None:
-            raise InputError("to_rebound(solution) takes its last state; for another give its problem, y= and t=.")
+            raise InputError(
+                "to_rebound(solution) takes its last state; for another give its problem, y= and t=."
+            )
         if not problem.t.size:
-            raise InputError(f"the solution has no state: it ended at t = {problem.t_stop!r}, {problem.reason}")
+            raise InputError(
+                f"the solution has no state: it ended at t = {problem.t_stop!r}, {problem.reason}"
+            )
         problem, y, t = problem.problem, problem.y[-1], float(problem.t[-1])
     check_is_problem(problem)
 

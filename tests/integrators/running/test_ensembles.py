@@ -351,7 +351,10 @@ def test_dask_gives_the_same(pendulum: Problem, made: Solutions) -> None:
         ({"times": [[np.nan, 1.0]] * N}, "with NaN at its end only"),
         ({"executor": 3}, "executor=3 is none"),
         ({"reduce": {"x": np.mean}}, "is no reduction"),
-        ({"reduce": {"x": Mean(lambda q: q[0])}, "sample": "steps"}, "give it over='times', or leave out sample="),
+        (
+            {"reduce": {"x": Mean(lambda q: q[0])}, "sample": "steps"},
+            "give it over='times', or leave out sample=",
+        ),
         ({"executor": ThreadPoolExecutor(1), "events": lambda q: q[0]}, "functions of a module"),
         ({"events": lambda q: q[0], "sample": "steps"}, "sample= and events= do not go together"),
         ({"piece": 0}, "at least 1"),
