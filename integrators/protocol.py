@@ -248,8 +248,8 @@ class Trajectories:
     t : ndarray, shape (m,)
         Times.
     y : ndarray, shape (n, m, dim)
-        States; NaN where a trajectory did not arrive. The last state of one that failed before all times is
-        returned by `integrators.integrate` of its problem, ``integrate(made[i].problem, made.method, [end])``.
+        States; NaN where a trajectory did not arrive. The last state of one that failed before all times:
+        ``integrators.integrate(made[i].problem, made.method, [end])``.
     status, reason : list, length n
         How each trajectory ended, and one sentence where it failed.
     t_stop : ndarray, shape (n,)
