@@ -1,4 +1,4 @@
-"""Milliseconds per step of molecular dynamics with 32, 108 and 256 atoms, beside a plain velocity Verlet in numba.
+"""Milliseconds per step of molecular dynamics with 32, 108 and 256 atoms, beside a plain Verlet in numba.
 
 The boxes have the density of `molecular_dynamics.py`, and the cutoff is at most half a box. Each time is the
 least of several runs; other work on the machine changes it.

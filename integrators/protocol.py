@@ -245,7 +245,8 @@ class Trajectories:
     t : ndarray, shape (m,)
         Times.
     y : ndarray, shape (n, m, dim)
-        States; NaN where a trajectory did not reach the time.
+        States; NaN where a trajectory did not reach the time. The last state of one that failed before all
+        times: ``integrators.integrate(made[i].problem, made.method, [end])``.
     status, reason : list, length n
         Status of each trajectory, and one sentence if it failed.
     t_stop : ndarray, shape (n,)

@@ -91,10 +91,10 @@ class PostNewtonian(CheckedOptions):
     ``-p_a^4/(8 m_a^3) + G^2 m_a (sum_b m_b/r_ab)^2/2`` and over pairs a, b, both ways, of
     ``-(G m_a m_b/(4 r_ab)) (6 p_a^2/m_a^2 - (7 p_a.p_b + (n_ab.p_a)(n_ab.p_b))/(m_a m_b))``, all over c^2.
 
-    Beside massless bodies or functions among the forces it is the acceleration of Einstein, Infeld and Hoffmann
-    in positions and velocities, in harmonic coordinates, which are those of ADM to this order. The two forms differ
-    by terms of the order 1/c^4, and the energy is conserved to that order only. With other forces there are no
-    terms of both.
+    Beside massless bodies or functions among the forces it is the acceleration of Einstein, Infeld and
+    Hoffmann in positions and velocities, in harmonic coordinates, which are those of ADM to this order. The
+    two forms differ by terms of the order 1/c^4, and the energy is conserved to that order only. With other
+    forces there are no terms of both.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ class PostNewtonian(CheckedOptions):
     References
     ----------
     A. Einstein, L. Infeld, B. Hoffmann, The gravitational equations and the problem of motion, Annals of
-    Mathematics 39 (1938), 65-100; in this form E. Poisson, C. M. Will, Gravity (2014), equation 9.127.
+    Mathematics 39 (1938), 65-100.
 
     Examples
     --------

@@ -212,8 +212,10 @@ def integrate_many(
             (numbers, (*given(numbers), problem.t0, threads, *(() if start else (sample, along(numbers)))))
             for numbers in gathered.missing(cast("int", size))
         ]
-        task = (find_in_piece, Search(problem, method, looked_for)) if start else (integrate_piece,)
-        pieces_ = Remote(executor, problem, method, *task).run(pieces)
+        task, more = (
+            (find_in_piece, [Search(problem, method, looked_for)]) if start else (integrate_piece, [])
+        )
+        pieces_ = Remote(executor, problem, method, task, *more).run(pieces)
     else:
         batches = start is None and directions is None and in_batches(program, grid, sample)
         few = program.piece if offers(program, PieceSize) else FIRST * threads

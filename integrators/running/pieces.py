@@ -368,7 +368,7 @@ class Remote:
     problem, method
         What is integrated, and how; they are sent to the workers.
     task : callable
-        ``task(problem, method, *more, *piece)`` returns the trajectories of a piece, or them and what happened
+        ``task(problem, method, *more, *piece)`` returns the trajectories of a piece, or also what happened
         in each; importable by the workers.
     more
         What else every piece needs.
@@ -395,7 +395,7 @@ class Remote:
             raise InputError(f"{what!s} cannot be sent to workers: {shown(str(error))}.") from None
 
     def run(self, pieces: list[tuple[Numbers, tuple[Any, ...]]]) -> Iterator[tuple[Numbers, Any, Any]]:
-        """Yield of each piece its numbers, trajectories and events, in order; or a text on why there are none.
+        """Yield of each piece its numbers, trajectories and events, in order; or a text why there are none.
 
         A piece whose worker dies is sent again, once. After an executor is broken nothing is sent.
         """

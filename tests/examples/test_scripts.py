@@ -41,8 +41,19 @@ def test_every_script_has_its_words():
     names = {path.name for path in SCRIPTS.glob("*.py")} - {
         "side_by_side.py",
         "run_all.py",
-    }  # which others import, and which runs others
+        "molecular_dynamics_sizes.py",
+    }  # which others import, which runs others, and which takes minutes
     assert names == set(SAYS)
+
+
+def test_the_sizes_of_molecular_dynamics_are_measured(monkeypatch):
+    monkeypatch.syspath_prepend(str(SCRIPTS))
+    import molecular_dynamics_sizes
+
+    monkeypatch.setattr(molecular_dynamics_sizes, "RUNS", 1)
+    atoms, *times = molecular_dynamics_sizes.row(2)
+    assert (atoms, len(times)) == (32, 3)
+    assert min(times) > 0.0
 
 
 def test_the_page_of_tasks_is_what_is_stored(monkeypatch):

@@ -8,7 +8,7 @@ from integrators import Status, integrate, registry, start
 from integrators.protocol import MethodBase
 
 ESCAPE = problems.Problem(problems.VectorField(lambda y: [y[0] ** 2], dim=1), y0=[1.0], t_end=2.0)
-# q = 1/(1 - t)^2
+# its solution is 1/(1 - t)^2
 FALL = problems.Problem(
     problems.Hamiltonian(lambda q, p: p[0] ** 2 / 2 - 2 * q[0] ** 3, dof=1), q0=[1.0], p0=[2.0], t_end=2.0
 )

@@ -1,5 +1,8 @@
 """Bodies with forces between them, and what else acts on them."""
 
+import doctest
+from pathlib import Path
+
 import mpmath
 import numpy as np
 import pytest
@@ -193,6 +196,12 @@ def test_a_force_of_ones_own():
 def test_what_are_no_bodies(change, words):
     with pytest.raises(InputError, match=words):
         nbody(**{"masses": MASSES, "positions": X, "velocities": V, "t_end": 1.0, **change})
+
+
+def test_the_examples_of_the_page_are_true():
+    page = Path(__file__).parents[2] / "docs" / "howto" / "bodies.md"
+    failed, tried = doctest.testfile(str(page), module_relative=False)
+    assert (failed, tried > 20) == (0, True)
 
 
 def test_poles_that_are_none():

@@ -47,8 +47,14 @@ def test_steps_are_reduced_over_the_times_of_each(piece: int | None) -> None:
     plain = integrate_many(PENDULUM, METHOD, starts=STARTS, times=own, sample="steps")
     most = Maximum(lambda t, p: t * p[0], over="times")
     found = integrate_many(
-        PENDULUM, METHOD, starts=STARTS, times=own, sample="steps", piece=piece, reduce={"most": most, "least": LEAST}
-    )  # fmt: skip
+        PENDULUM,
+        METHOD,
+        starts=STARTS,
+        times=own,
+        sample="steps",
+        piece=piece,
+        reduce={"most": most, "least": LEAST},
+    )
     assert np.array_equal(found.reduced["least"], np.nanmin(plain.y[:, :, 0], axis=1))
     assert np.array_equal(found.reduced["most"], np.nanmax(plain.t * plain.y[:, :, 1], axis=1))
     assert np.array_equal(found.t[:, 0], np.nanmax(plain.t, axis=1))
@@ -58,7 +64,9 @@ def test_steps_are_reduced_over_the_times_of_each(piece: int | None) -> None:
 def test_samples_until_a_terminal_event_are_reduced() -> None:
     times = np.linspace(0.1, 5.0, 50)
     plain = integrate_many(PENDULUM, METHOD, starts=STARTS, times=times, events=TURN)
-    found = integrate_many(PENDULUM, METHOD, starts=STARTS, times=times, events=TURN, reduce={"mean": MEAN, "least": LEAST})  # fmt: skip
+    found = integrate_many(
+        PENDULUM, METHOD, starts=STARTS, times=times, events=TURN, reduce={"mean": MEAN, "least": LEAST}
+    )
     assert {*found.status} == {Status.EVENT}
     assert np.isnan(plain.y[:, -1]).all()
     with np.errstate(invalid="ignore"):
@@ -99,7 +107,10 @@ def _same(one: Solutions, other: Solutions) -> None:
 def test_workers_find_events(times: Any) -> None:
     alone = integrate_many(PENDULUM, METHOD, starts=STARTS, times=times, events=TURN)
     with ThreadPoolExecutor(2) as pool:
-        _same(integrate_many(PENDULUM, METHOD, starts=STARTS, times=times, events=TURN, executor=pool, piece=3), alone)  # fmt: skip
+        _same(
+            integrate_many(PENDULUM, METHOD, starts=STARTS, times=times, events=TURN, executor=pool, piece=3),
+            alone,
+        )
     assert any(len(happened["turn"]) for happened in alone.events)
 
 
