@@ -42,7 +42,7 @@ by `offers`; without it the method still integrates. The conformance kit checks 
 12. `KeptError`: after ``USER_ERROR``, ``error`` is the exception that a function of the user raised.
 13. `Events`: ``with_events`` of a program starts steppers that look for events in their steps. Such an
     `EventStepper` has the ``search``, and ``look_to``, which searches the step ahead up to the last time.
-    `Actions`: with ``acts`` these events may change the state.
+    `Actions`: with ``acts`` these events may change the state and the parameters.
 14. `Interruptible`: another thread sets ``stop`` of a stepper to call it back from ``advance``. Events of
     many trajectories are looked for in several threads.
 15. `Batches`: ``batch`` of a program integrates many starts better than one after another, for
@@ -463,7 +463,10 @@ class EventStepper(Protocol):
 
 
 class Actions(Protocol):
-    """A program whose events may change the state (``Event(then=...)``).
+    """A program whose events may change the state and the parameters (``Event(then=...)``).
+
+    A stepper that looks for such events has ``par``, the present parameters, shape (n_par,), and its ``search``
+    passes those after each event to `integrators.events.finder.Hits`.
 
     Attributes
     ----------

@@ -373,7 +373,7 @@ def by_hand(problem, event):
     """Return the times of an event's actions and the last state, by a new start after each."""
     t, y, end, times = problem.t0, problem.y0, problem.t_end, []
     while True:
-        piece = Problem(PENDULUM, y0=y, parameters=problem.parameters, t0=t, t_end=end)
+        piece = Problem(PENDULUM, y0=y, parameters={"g": float(problem.par[0])}, t0=t, t_end=end)
         plain = Event(event.g, direction=event.direction, name="plain")
         found = integrate(piece, HBVM(), [end], events=plain)
         hits = found.events["plain"]
