@@ -465,8 +465,8 @@ class EventStepper(Protocol):
 class Actions(Protocol):
     """A program whose events may change the state and the parameters (``Event(then=...)``).
 
-    A stepper that looks for such events has ``par``, the present parameters, shape (n_par,), and its ``search``
-    passes those after each event to `integrators.events.finder.Hits`.
+    A stepper that looks for such events has ``par``, the present parameters, shape (n_par,), and its
+    ``search`` passes those after each event to `integrators.events.finder.Hits`.
 
     Attributes
     ----------
