@@ -23,7 +23,6 @@ from integrators.plain import (
 from integrators.protocol import Array, MethodBase, Stats, Status, Trajectories
 from integrators.segments import Segments
 from integrators.solution import Occurrences, Solution, library, of_type, write_whole
-from problems.analysis import invariants
 from problems.checks import File, checked_arguments, readable
 from problems.errors import printable, shown
 from problems.problem import Problem
@@ -205,15 +204,8 @@ class Solutions(Trajectories):
 
     def invariants(self) -> dict[str, Array]:
         """Return the invariants, shape (n, m), or (n, m, k) of a vector, by name."""
-        system = self.problem.system
-
-        def values(i: int, segments: Segments) -> dict[str, Array]:
-            def along(k: int, t: Array, y: Array) -> dict[str, Array]:
-                return invariants.invariants(system, segments.par[k], y, t)
-
-            return segments.gathered(self._times[i], self.y[i], along)
-
-        return self._gathered([values(i, segments) for i, segments in enumerate(self._segments())])
+        system, members = self.problem.system, zip(self._segments(), self._times, self.y, strict=True)
+        return self._gathered([segments.invariants(system, t, y) for segments, t, y in members])
 
     def errors(self) -> dict[str, Array]:
         """Return the deviation of each invariant from its initial value, shape (n, m), by name.
@@ -221,16 +213,8 @@ class Solutions(Trajectories):
         As `problems.Problem.errors`; NaN at times that a trajectory did not reach. After an event that changes
         the state they are relative to the state after it, as in `Solution.errors`.
         """
-        system = self.problem.system
-
-        def values(i: int, segments: Segments) -> dict[str, Array]:
-            def errors(k: int, t: Array, y: Array) -> dict[str, Array]:
-                start = float(segments.t[k]), segments.y[k]
-                return invariants.errors(system, segments.par[k], y, t, start=start)
-
-            return segments.gathered(self._times[i], self.y[i], errors)
-
-        return self._gathered([values(i, segments) for i, segments in enumerate(self._segments())])
+        system, members = self.problem.system, zip(self._segments(), self._times, self.y, strict=True)
+        return self._gathered([segments.errors(system, t, y) for segments, t, y in members])
 
     def _segments(self) -> Iterator[Segments]:
         """Return the segments of each trajectory between events that change the state or the parameters."""

@@ -8,55 +8,55 @@ For a method with a fixed step size derive from `integrators.stepping.FixedStep`
 ``accepts`` and the function that takes the steps have to be written.
 
 1. Derive a frozen, keyword-only dataclass from `MethodBase`. Annotate each option with its constraint
-(`problems.checks`, `integrators.options`), which is then checked. Check conditions on several options in
-``__post_init__``, after that of the base, and raise `problems.errors.InputError`.
-2. Set the class attributes ``library`` (the package that does the work), ``citation``
-   (how its authors ask to be cited) and ``order`` (``None`` where the order varies with
-   the tolerance).
+   (`problems.checks`, `integrators.options`), which is then checked. Check conditions on several options in
+   ``__post_init__``, after that of the base, and raise `problems.errors.InputError`.
+2. Set the class attributes ``library`` (the package that does the work), ``citation`` (how its authors ask
+   to be cited) and ``order`` (``None`` where the order varies with the tolerance).
 3. ``accepts(problem)`` returns ``None``, or a sentence on why the method cannot integrate it. Omit it if the
-method accepts every system.
+   method accepts every system.
 4. ``compile(system)`` does all compilation, imports the library (raising
-   `problems.errors.MissingLibraryError`) and returns a `Program`, which knows
-   the seconds that this took. Parameters are run-time values.
+   `problems.errors.MissingLibraryError`) and returns a `Program`, which knows the seconds that this took.
+   Parameters are run-time values.
 5. ``program.start(y0, par, t0)`` returns a `Stepper` at ``t0``.
-6. A stepper's ``advance`` does most of the work in compiled code and returns the samples it reached; ``step``
-takes one step, for inspection. The class attribute ``to_end`` names the sampling with which the library
-itself integrates to an end time, if it differs from the default: that one is timed.
-7. A numerical failure is a `Status`, never an exception, never a silent NaN,
-   and never an endless loop; the samples computed before it are returned.
-8. Register the class under the entry point group ``hbvm_bench.integrators``;
-   `integrators.testing` then checks it against this guide.
+6. A stepper's ``advance`` does most of the work in compiled code and returns the samples it reached;
+   ``step`` takes one step, for inspection. The class attribute ``to_end`` names the sampling with which the
+   library itself integrates to an end time, if it differs from the default: that one is timed.
+7. A numerical failure is a `Status`, never an exception, never a silent NaN, and never an endless loop; the
+   samples computed before it are returned.
+8. Register the class under the entry point group ``hbvm_bench.integrators``; `integrators.testing` then
+   checks it against this guide.
 
 The following is optional. Each capability is a class of this module, which the rest of the package tests for
 by `offers`; without it the method still integrates. The conformance kit checks those that are offered.
 
 9. `Samplings`: the attribute ``samplings`` of a stepper lists the samplings that its ``advance`` supports,
-the default first. Without it all of `SAMPLINGS` are expected.
+   the default first. Without it all of `SAMPLINGS` are expected.
 10. `Checkpoints`: ``checkpoint`` returns all data that a bitwise identical continuation needs, with the
-identity of the integration (`integrators.running.checkpoints.Identity`); ``restore`` accepts only such a
-checkpoint. Checkpoint files need it (``integrate(checkpoint=...)``).
-11. `Destination`: the attribute ``destination`` of a stepper that stops when its steps collapse is the end of
-the whole integration, which `integrate` reaches in pieces. `integrators.running.watchdog` has the rule.
+    identity of the integration (`integrators.running.checkpoints.Identity`); ``restore`` accepts only such a
+    checkpoint. Checkpoint files need it (``integrate(checkpoint=...)``).
+11. `Destination`: the attribute ``destination`` of a stepper that stops when its steps collapse is the end
+    of the whole integration, which `integrate` reaches in pieces. `integrators.running.watchdog` has the
+    rule.
 12. `KeptError`: after ``USER_ERROR``, ``error`` is the exception raised by a user function.
 13. `Events`: ``with_events`` of a program starts steppers that search their steps for events. Such an
-`EventStepper` has the ``search``, and ``look_to``, which searches the next step up to the last time.
-`Actions`: with ``acts`` these events may change the state.
+    `EventStepper` has the ``search``, and ``look_to``, which searches the next step up to the last time.
+    `Actions`: with ``acts`` these events may change the state and the parameters.
 14. `Interruptible`: another thread sets ``stop`` of a stepper to interrupt ``advance``. Many trajectories
-with events are integrated in several threads.
+    with events are integrated in several threads.
 15. `Batches`: ``batch`` of a program integrates many initial conditions faster than one after another, for
-`integrate_many`. `PreparedBatches`: ``prepare_batch`` does everything except the integration, which the
-benchmark can then time separately. `Threads`: with ``threaded`` it takes ``threads=``. `PieceSize`: ``piece``
-is the recommended number of trajectories of the first call.
+    `integrate_many`. `PreparedBatches`: ``prepare_batch`` does everything except the integration, which the
+    benchmark can then time separately. `Threads`: with ``threaded`` it takes ``threads=``. `PieceSize`:
+    ``piece`` is the recommended number of trajectories of the first call.
 16. `TimeLimit`: after ``time_limit`` seconds ``advance`` returns the samples that it has computed, so that
-`integrate` can request all of them at once and Ctrl-C loses few.
+    `integrate` can request all of them at once and Ctrl-C loses few.
 17. `Variations`: ``follow`` of a stepper propagates tangent vectors; ``variations`` are the vectors at the
-samples of the last ``advance``.
+    samples of the last ``advance``.
 18. `Gradients`: a stepper can ``record`` its steps, and ``adjoint`` integrates the adjoint equations over
-them backwards. `integrators.gradient` needs this and `Checkpoints`.
-19. `DoubleDouble`: ``start_pairs`` of a program starts from states with twice the digits of a double; ``low``
-of such a `LowParts` stepper has the low parts of the samples.
+    them backwards. `integrators.gradient` needs this and `Checkpoints`.
+19. `DoubleDouble`: ``start_pairs`` of a program starts from states with twice the digits of a double;
+    ``low`` of such a `LowParts` stepper has the low parts of the samples.
 20. `AsHBVM`: ``as_hbvm`` of a method returns the HBVM(k, s) that it is identical to; `integrators.order_of`
-and the plugins use its coefficients.
+    and the plugins use its coefficients.
 """
 
 import inspect
@@ -463,7 +463,10 @@ class EventStepper(Protocol):
 
 
 class Actions(Protocol):
-    """A program whose events may change the state (``Event(then=...)``).
+    """A program whose events may change the state and the parameters (``Event(then=...)``).
+
+    A stepper that looks for such events has ``par``, the present parameters, shape (n_par,), and its
+    ``search`` passes those after each event to `integrators.events.finder.Hits`.
 
     Attributes
     ----------

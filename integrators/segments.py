@@ -1,6 +1,6 @@
 """The segments of a trajectory between events that change the state or the parameters."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from integrators.protocol import Array
+from problems.analysis import invariants
+from problems.problem import System
 
 CLOSE = 2.0**-48  # relative difference up to which a sample's time may be that of an event
 
@@ -73,16 +75,15 @@ class Segments:
         before = np.abs(y - self.before[following]).max(axis=1, initial=0.0)
         return np.where(close & (after <= before), following, np.maximum(places, 0))
 
-    def gathered(
-        self, t: Array, y: Array, evaluate: Callable[[int, Array, Array], Mapping[str, Array]]
-    ) -> dict[str, Array]:
-        """Return what a function of a segment's number and its samples gives, for samples of any segments."""
-        if self.t.size == 1 or not t.size:
-            return dict(evaluate(0, t, y))
-        places, whole = self.places(t, y), {}
-        for k in np.unique(places).tolist():
-            mine = places == k
-            for name, values in evaluate(k, t[mine], y[mine]).items():
-                rows = whole.setdefault(name, np.empty((t.size, *values.shape[1:])))
-                rows[mine] = values
-        return whole
+    def invariants(self, system: System, t: Array, y: Array) -> dict[str, Array]:
+        """Return the invariants at samples (m,), (m, dim), with the parameters of each, by name."""
+        par = self.par[0] if self.t.size == 1 else self.par[self.places(t, y)].T
+        return invariants.invariants(system, par, y, t)
+
+    def errors(self, system: System, t: Array, y: Array) -> dict[str, Array]:
+        """Return how far they are from those at the start of the segment of each sample, shape (m,)."""
+        if self.t.size == 1:
+            return invariants.errors(system, self.par[0], y, t, start=(float(self.t[0]), self.y[0]))
+        places = self.places(t, y)
+        starts = self.t[places], self.y[places]
+        return invariants.errors_since(system, self.par[places].T, y, t, starts=starts)

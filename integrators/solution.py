@@ -345,15 +345,11 @@ class Solution:
     @property
     def v(self) -> Array | None:
         """Velocities (n, dof) of a Lagrangian, or a Hamiltonian with constant masses, else ``None``."""
-        problem = self.problem
-        if not self._acted or problem.velocity(self.y[:0], self.t[:0]) is None:
-            return problem.velocity(self.y, self.t)
+        if not self._acted:
+            return self.problem.velocity(self.y, self.t)
         segments = self._segments
-
-        def velocity(k: int, t: Array, y: Array) -> dict[str, Any]:
-            return {"v": invariants.velocity(problem.system, segments.par[k], y, t)}
-
-        return segments.gathered(self.t, self.y, velocity)["v"]
+        par = segments.par[segments.places(self.t, self.y)].T
+        return invariants.velocity(self.problem.system, par, self.y, self.t)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -376,12 +372,7 @@ class Solution:
 
     def invariants(self) -> dict[str, Array]:
         """Return the problem's invariants along the trajectory, by name, with the parameters of each time."""
-        if not self._acted:
-            return self.problem.invariants(self.y, self.t)
-        system, segments = self.problem.system, self._segments
-        return segments.gathered(
-            self.t, self.y, lambda k, t, y: invariants.invariants(system, segments.par[k], y, t)
-        )
+        return self._segments.invariants(self.problem.system, self.t, self.y)
 
     def errors(self) -> dict[str, Array]:
         """Return the errors of the invariants along the trajectory, relative where that has a meaning.
@@ -394,16 +385,8 @@ class Solution:
 
     def _errors(self, which: Any) -> dict[str, Array]:
         problem = self.problem
-        if self._acted:
-            segments = self._segments
-
-            def errors(k: int, t: Array, y: Array) -> dict[str, Array]:
-                start = float(segments.t[k]), segments.y[k]
-                return invariants.errors(problem.system, segments.par[k], y, t, start=start)
-
-            return segments.gathered(self.t[which], self.y[which], errors)
         if self.low is None or self.start is None:
-            return problem.errors(self.y[which], self.t[which])
+            return self._segments.errors(problem.system, self.t[which], self.y[which])
         states, begin = DD(self.y[which], self.low[which]), (problem.t0, DD(*self.start.T))
         return invariants.errors(problem.system, problem.par, states, self.t[which], start=begin)
 

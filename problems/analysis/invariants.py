@@ -26,6 +26,7 @@ Array = NDArray[np.float64]
 # Numbers held at once by a declared sum's terms, so that many states and many terms fit in memory.
 _BLOCK = 2_000_000
 _SMALLEST, _LARGEST = 1e-270, 1e290  # sizes between which pairs of doubles have their 32 digits
+_TINY = 1e-60  # a product of four states that are as large is not below the smallest double
 _OPERATIONS: dict[str, Callable[..., DD]] = {name: f.double_double for name, f in FUNCTIONS.items()} | {
     "add": operator.add,
     "sub": operator.sub,
@@ -214,6 +215,49 @@ def errors(
     return by_name
 
 
+def errors_since(
+    system: System, par: Array, y: Array, t: Array, *, starts: tuple[Array, Array]
+) -> dict[str, Array]:
+    """Return how far the invariants are from those at the start of each state, relative as in `errors`.
+
+    Parameters
+    ----------
+    system : System
+    par : ndarray, shape (n_par, n)
+        Parameters of each state, and of its start.
+    y, t : ndarray, shapes (n, dim), (n,)
+        States and times.
+    starts : pair of ndarray, shapes (n,), (n, dim)
+        Times and states that they are compared with.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (n,)
+    """
+    from problems.analysis import wide  # which loads mpmath
+
+    t0, y0 = starts
+    states, begin = _states(system, y), _states(system, y0)
+    tiny = (np.where(y0 == 0.0, 1.0, np.abs(y0)) < _TINY).any(axis=1)  # then an invariant may only seem 0
+    by_name: dict[str, Array] = {}
+    for name, function in system.invariants.items():
+        first, values = _along(function, par, begin, t0), _along(function, par, states, t)
+        gaps = np.stack([(now - before).rounded() for now, before in zip(values, first, strict=True)])
+        size = np.stack([value.rounded() for value in first])
+        largest = np.abs(size).max(axis=0)
+        unit = np.where((largest > 0.0) & (largest < np.inf), largest, 1.0)
+        with np.errstate(all="ignore"):
+            whole = np.linalg.norm(size / unit, axis=0)
+            errors = np.linalg.norm(gaps / unit, axis=0) / np.where(whole == 0.0, 1.0, whole)
+        ordinary = (largest >= _SMALLEST) & (largest <= _LARGEST) | (largest == 0.0) & ~tiny
+        again = np.isfinite(states.hi).all(axis=1) & ~(ordinary & np.isfinite(errors))
+        for i in np.flatnonzero(again):
+            before = wide.evaluate(function, float(t0[i]), y0[i], par[:, i])
+            errors[i] = wide.relative(wide.evaluate(function, float(t[i]), y[i], par[:, i]), before)
+        by_name[name] = errors
+    return by_name
+
+
 def guards(system: System, par: Array, y: ArrayLike, t: ArrayLike | None) -> dict[str, Array]:
     """Return the guards along states, see `problems.problem.Problem.guards`."""
     states = _states(system, y)
@@ -224,7 +268,8 @@ def guards(system: System, par: Array, y: ArrayLike, t: ArrayLike | None) -> dic
 
 
 def _scale(system: System, par: Array) -> list[DD]:
-    return evaluate(system.function("velocity_scale"), 0.0, np.zeros((system.dim, 1)), par)
+    columns = par.shape[1] if par.ndim == 2 else 1
+    return evaluate(system.function("velocity_scale"), 0.0, np.zeros((system.dim, columns)), par)
 
 
 def velocity(system: System, par: Array, y: ArrayLike, t: ArrayLike | None) -> Array | None:
