@@ -5,12 +5,18 @@ from typing import Any
 
 from integrators.kernel.context import Context
 from integrators.kernel.native.memory import Content
+from integrators.kernel.tangent.group import Directions
+from integrators.kernel.tangent.vectors import Vectors
+from problems.problem import System
 
 PAIRS = 4
 """That are spare at most: more trajectories at a time have memory of their own."""
 
 BYTES = 1 << 18
 """In a context that is spare, at most: beside the steps of such a system a fresh one costs little."""
+
+BYTES_OF_VECTORS = 1 << 20
+"""In the tangent vectors of a pair that is spare, at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +44,40 @@ class Pair:
     def __init__(self, own: Context, partial: Context):
         self.own, self.partial = own, partial
         self.small = own.nbytes <= BYTES
+        self._vectors: dict[tuple[Any, ...], Vectors] = {}
+
+    def follow(
+        self, system: System, directions: Directions, fresh: dict[tuple[int, bool], Context]
+    ) -> Vectors:
+        """Return vectors that follow the trajectory from here on, in memory that is kept, or fresh.
+
+        Parameters
+        ----------
+        system : System
+            The trajectory's.
+        directions : Directions
+            The vectors.
+        fresh : dict
+            As for `Vectors`.
+        """
+        key = *directions.state.shape, bool(directions.parameters.any())
+        if (vectors := self._vectors.get(key)) is not None:
+            vectors.begin(directions)
+            return vectors
+        vectors = Vectors(system, (self.own, self.partial), directions, fresh)
+        kept = {key: vectors} | self._vectors  # the last one first
+        self._vectors = {}
+        room = BYTES_OF_VECTORS
+        for each, member in kept.items():
+            room -= member.nbytes
+            if room >= 0:
+                self._vectors[each] = member
+        return vectors
+
+    def leave_solvers(self) -> None:
+        """Forget vectors that have implicit solvers, which take more memory than they."""
+        if self._vectors:
+            self._vectors = {key: vectors for key, vectors in self._vectors.items() if not vectors.solvers}
 
     def keep(self, par: bytes) -> None:
         """Take what both hold for what a trajectory with these parameters begins with."""
@@ -70,4 +110,5 @@ class Spare:
     def give(self, pair: Pair) -> None:
         """Take the pair of a trajectory that is over."""
         if pair.small and len(self._pairs) < self._most:
+            pair.leave_solvers()
             self._pairs.append(pair)

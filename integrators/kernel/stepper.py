@@ -37,7 +37,8 @@ from integrators.kernel.searches import LastingSearch
 from integrators.kernel.spare import Pair, Spare
 from integrators.kernel.step.engine import steps
 from integrators.kernel.tables import Constants
-from integrators.kernel.tangent.vectors import Directions, Vectors
+from integrators.kernel.tangent.group import Directions
+from integrators.kernel.tangent.vectors import Vectors
 from integrators.protocol import SAMPLINGS, Array, Samples, Stats, Status, UserError, sampling_named
 from integrators.refusals import check_times, one_thread
 from integrators.running.checkpoints import Identity
@@ -169,8 +170,8 @@ class HBVMStepper(ABC):
         self._begin(y, t0)
 
     def __del__(self) -> None:
-        # A search for events, vectors and records know the memory too, and may be there longer.
-        if self._pair is None or self._vectors is not None or self._recorded:
+        # A search for events and records know the memory too, and may be there longer.
+        if self._pair is None or self._recorded:
             return
         if self.search is None:
             self._program.spare.give(self._pair)
@@ -197,7 +198,8 @@ class HBVMStepper(ABC):
         if self._vectors and self._vectors.fits(directions):
             self._vectors.put(directions.state)
         else:
-            self._vectors = Vectors(system, (self._context, self._partial), directions, program.vectors)
+            assert self._pair is not None
+            self._vectors = self._pair.follow(system, directions, program.vectors)
             if self._implicit is not None:
                 self._vectors.solve_by(self._implicit)
         program.compile_seconds += binary.clock() - started
