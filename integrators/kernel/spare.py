@@ -7,7 +7,6 @@ from integrators.kernel.context import Context
 from integrators.kernel.native.memory import Content
 from integrators.kernel.tangent.group import Directions
 from integrators.kernel.tangent.vectors import Vectors
-from problems.problem import System
 
 PAIRS = 4
 """That are spare at most: more trajectories at a time have memory of their own."""
@@ -44,40 +43,24 @@ class Pair:
     def __init__(self, own: Context, partial: Context):
         self.own, self.partial = own, partial
         self.small = own.nbytes <= BYTES
-        self._vectors: dict[tuple[Any, ...], Vectors] = {}
+        self._vectors: dict[tuple[int, int, bool], Vectors] = {}
 
-    def follow(
-        self, system: System, directions: Directions, fresh: dict[tuple[int, bool], Context]
-    ) -> Vectors:
-        """Return vectors that follow the trajectory from here on, in memory that is kept, or fresh.
+    def kept_vectors(self, directions: Directions) -> Vectors | None:
+        """Return the memory of as many vectors as these, that followed a trajectory here; else ``None``."""
+        return self._vectors.get((*directions.state.shape, directions.move_parameters))
 
-        Parameters
-        ----------
-        system : System
-            The trajectory's.
-        directions : Directions
-            The vectors.
-        fresh : dict
-            As for `Vectors`.
-        """
-        key = *directions.state.shape, bool(directions.parameters.any())
-        if (vectors := self._vectors.get(key)) is not None:
-            vectors.begin(directions)
-            return vectors
-        vectors = Vectors(system, (self.own, self.partial), directions, fresh)
-        kept = {key: vectors} | self._vectors  # the last one first
-        self._vectors = {}
-        room = BYTES_OF_VECTORS
-        for each, member in kept.items():
+    def keep_vectors(self, vectors: Vectors) -> None:
+        """Keep their memory for others, before that of the ones kept already."""
+        kept, self._vectors, room = {vectors.kind: vectors} | self._vectors, {}, BYTES_OF_VECTORS
+        for kind, member in kept.items():
             room -= member.nbytes
             if room >= 0:
-                self._vectors[each] = member
-        return vectors
+                self._vectors[kind] = member
 
     def leave_solvers(self) -> None:
-        """Forget vectors that have implicit solvers, which take more memory than they."""
-        if self._vectors:
-            self._vectors = {key: vectors for key, vectors in self._vectors.items() if not vectors.solvers}
+        """Forget vectors that have implicit solvers, whose memory is larger than theirs."""
+        if any(vectors.solvers for vectors in self._vectors.values()):
+            self._vectors = {}
 
     def keep(self, par: bytes) -> None:
         """Take what both hold for what a trajectory with these parameters begins with."""

@@ -192,17 +192,20 @@ class HBVMStepper(ABC):
     def follow(self, state: ArrayLike, parameters: ArrayLike) -> None:
         """Let tangent vectors follow the trajectory from here on; see `integrators.protocol.Variations`."""
         self._check_derivatives("variations")
-        system, program = self._program.system, self._program
-        started = binary.clock()
-        directions = Directions(*(np.array(part, dtype=np.float64) for part in (state, parameters)))
+        directions = Directions(np.array(state, dtype=np.float64), np.array(parameters, dtype=np.float64))
         if self._vectors and self._vectors.fits(directions):
             self._vectors.put(directions.state)
-        else:
-            assert self._pair is not None
-            self._vectors = self._pair.follow(system, directions, program.vectors)
-            if self._implicit is not None:
-                self._vectors.solve_by(self._implicit)
-        program.compile_seconds += binary.clock() - started
+            return
+        assert self._pair is not None
+        self._vectors = self._pair.kept_vectors(directions)
+        if self._vectors is None:
+            system, program, started = self._program.system, self._program, binary.clock()
+            self._vectors = Vectors(system, (self._context, self._partial), directions, program.vectors)
+            self._pair.keep_vectors(self._vectors)
+            program.compile_seconds += binary.clock() - started
+        self._vectors.begin(directions)
+        if self._implicit is not None:
+            self._vectors.solve_by(self._implicit)
 
     def _check_derivatives(self, label: str) -> None:
         """Refuse what needs the derivatives of the steps where these have none."""

@@ -28,6 +28,11 @@ class Directions:
     state: Array
     parameters: Array
 
+    @property
+    def move_parameters(self) -> bool:
+        """Whether any has a part in the parameters."""
+        return self.parameters.size > 0 and bool(self.parameters.any())
+
     def some(self, part: slice) -> "Directions":
         """Return some of the vectors."""
         return Directions(self.state[:, part], self.parameters[:, part])

@@ -21,7 +21,7 @@ OPERATIONS = 1000  # of the derivatives of a group, about: what is written out t
 
 
 class Vectors:
-    """Tangent vectors that follow a trajectory, and after it others in the same memory.
+    """The memory of tangent vectors that follow a trajectory from `begin` on, and after it others.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ class Vectors:
     contexts : pair of Context
         Of the trajectory, and for its partial steps; complete, with the start.
     directions : Directions
-        The vectors at the start.
+        As many as the vectors, which move parameters if they do.
     fresh : dict
         Where contexts are kept that the next trajectory of the same program can copy.
     """
@@ -43,8 +43,10 @@ class Vectors:
         fresh: dict[tuple[int, bool], Context],
     ):
         self._context = contexts[0]
-        self.shape, moves = directions.state.shape, bool(directions.parameters.any())
+        self.shape, moves = directions.state.shape, directions.move_parameters
         dim, count = self.shape
+        self.kind = dim, count, moves
+        """What others must have in common with these to have their memory."""
         operations = len(reachable(system.function(function_of(self._context.shape)).roots))
         most = max(1, min(MOST, OPERATIONS // operations))
         ends = np.cumsum([part.size for part in np.array_split(np.arange(count), -(-count // most))]).tolist()
@@ -62,7 +64,8 @@ class Vectors:
         memory.vectors[:] = [group.count for group in self._groups]
         self.nbytes = sum(group.nbytes for group in self._groups)
         self._code, self._out = follow.code().address, np.empty((0, *self.shape))
-        self.begin(directions)
+        self._known: dict[float, Array] = {}
+        self._pulls = memory.pulls
 
     def begin(self, directions: Directions) -> None:
         """Follow the trajectory whose memory the contexts have now, from its present state on."""
@@ -70,12 +73,15 @@ class Vectors:
         self._solver: Workspace | None = None  # of the trajectory
         self.solvers: list[Workspace] = []
         """The implicit solvers of the vectors, where there are any."""
-        self._known: dict[float, Array] = {}
+        self._known.clear()
         self.room(FEWEST)
-        for group, part in zip(self._groups, self._parts, strict=True):
-            group.begin(directions.some(part))
-        pulls = (group.pulls for group in self._groups)
-        self._memory.pulls[:] = [0 if each is None else each.ctypes.data for each in pulls]
+        if len(self._groups) == 1:
+            self._groups[0].begin(directions)
+        else:
+            for group, part in zip(self._groups, self._parts, strict=True):
+                group.begin(directions.some(part))
+        for i, group in enumerate(self._groups):
+            self._pulls[i] = 0 if group.pulls is None else group.pulls.ctypes.data
         self._memory.failed = 0
         self._context.follow_memory = self._memory.address  # its stepper refers to the vectors
         self._context.follow = self._code
@@ -83,7 +89,7 @@ class Vectors:
     def solve_by(self, solvers: tuple[Workspace, Workspace]) -> None:
         """Give the vectors the implicit solver of the trajectory and that of its partial steps."""
         self._solver = solvers[0]
-        for group, pulls in zip(self._groups, self._memory.pulls.tolist(), strict=True):
+        for group, pulls in zip(self._groups, self._pulls.tolist(), strict=True):
             for context, solver in zip((group.own, group.partial), solvers, strict=True):
                 workspace = solver.along(context.shape, context.padded, pulls)
                 context.implicit.code, context.implicit.memory = (
@@ -108,7 +114,7 @@ class Vectors:
     def room(self, count: int) -> None:
         """Make room for the vectors at so many samples."""
         count = max(count, FEWEST)
-        if len(self._out) != count or self._known:  # which are parts of it
+        if self._out.shape[0] != count or self._known:  # which are parts of it
             self._out = np.empty((count, *self.shape))
             self._memory.point({"out": self._out})
 
