@@ -52,7 +52,8 @@ by `offers`; without it the method still integrates. The conformance kit checks 
 16. `TimeLimit`: after ``time_limit`` seconds ``advance`` returns the samples that it has, so that `integrate`
     can ask for all of them at once and Ctrl-C loses few.
 17. `Variations`: tangent vectors ``follow`` a stepper; ``variations`` are the vectors at the samples of the
-    last ``advance``.
+    last ``advance``. `BatchesAlong`: ``batch_along`` of a program integrates many starts with tangent
+    vectors, where it ``goes_along`` with so many.
 18. `Gradients`: a stepper can ``record`` its solved steps, and their ``adjoint`` follows these backwards.
     With this and `Checkpoints`, `integrators.gradient` works.
 19. `DoubleDouble`: ``start_pairs`` of a program begins from states with twice the digits of a double; what
@@ -587,6 +588,40 @@ class Batches(Protocol):
         ...
 
 
+class BatchesAlong(Protocol):
+    """A program with a better way to integrate many starts with tangent vectors than one after another."""
+
+    def goes_along(self, directions: tuple[Array, Array]) -> bool:
+        """Whether it has for so many vectors; they are as for `batch_along`."""
+        ...
+
+    def batch_along(
+        self, Y0: ArrayLike, par: ArrayLike | None = None, *, times: ArrayLike, t0: float = 0.0,
+        directions: tuple[Array, Array], threads: int = 1,
+    ) -> Trajectories:  # fmt: skip
+        """Do what `Batches.batch` does, with vectors: the result has `Trajectories.variations`.
+
+        Parameters
+        ----------
+        Y0, par, times, t0
+            As for `Batches.batch`.
+        directions : pair of ndarray, shapes (n, dim, k), (n, n_par, k)
+            Parts of the tangent vectors in the starts and in the parameters.
+        threads : int
+            Threads to share the work among.
+
+        Returns
+        -------
+        Trajectories
+
+        Raises
+        ------
+        problems.errors.InputError
+            Where `goes_along` says that it cannot, and as `Batches.batch`.
+        """
+        ...
+
+
 class PreparedBatches(Protocol):
     """A program whose batches can be prepared, so that a clock runs for the integration alone."""
 
@@ -670,8 +705,8 @@ class AsHBVM(Protocol):
 
 CAPABILITIES: tuple[type, ...] = (
     Samplings, Destination, KeptError, Checkpoints, Interruptible, EventStepper,
-    Events, Actions, Batches, PreparedBatches, Threads, PieceSize, TimeLimit, Variations, Gradients,
-    DoubleDouble, LowParts, AsHBVM,
+    Events, Actions, Batches, BatchesAlong, PreparedBatches, Threads, PieceSize, TimeLimit, Variations,
+    Gradients, DoubleDouble, LowParts, AsHBVM,
 )  # fmt: skip
 """All of them."""
 

@@ -114,7 +114,11 @@ def integrate_many(
         ones are kept. A mean depends on ``piece`` in its last digits; nothing depends on threads or workers.
     variations : array_like, shape (dim, k) or (n, dim, k), or str, or sequence of str, optional
         As for `integrate`, at the start of each trajectory, or tangent vectors of each: ``variations`` of
-        the result has the shape (n, m, dim, k). Trajectories then go one by one, or one in each thread.
+        the result has the shape (n, m, dim, k). With a fixed step size trajectories go in lanes with their
+        vectors, where their components and those of the vectors are at most 64 (half of them in
+        second-order form); the result is that of `integrate` up to rounding. With an adaptive step size,
+        where the vectors' errors would change the lengths of the steps, and for larger systems they go one
+        by one, or one in each thread.
     executor : concurrent.futures.Executor, optional
         Who integrates: a ``ProcessPoolExecutor``, ``dask.distributed.Client().get_executor()``, ... A piece
         whose worker dies is sent once more; if that fails, its trajectories are ``INTERRUPTED``.
@@ -207,7 +211,7 @@ def integrate_many(
         ]
         pieces_ = Remote(executor, problem, method, integrate_piece).run(pieces)
     else:
-        batches = start is None and directions is None and in_batches(program, grid, sample)
+        batches = start is None and in_batches(program, grid, sample, directions)
         few = program.piece if offers(program, PieceSize) else FIRST * threads
         soon = SOON if progress or checkpoint is not None else UNWATCHED
         pieces_ = _local(here, gathered, few if batches else threads, size, soon)

@@ -332,7 +332,7 @@ def test_an_ensemble_has_those_of_each_trajectory(tmp_path):
 
 def test_each_trajectory_of_an_ensemble_has_vectors_of_its_own(tmp_path):
     """The bits of single trajectories, also from a file and after a break."""
-    problem, method, times = SYSTEMS["masses"](), Gauss(s=4, h=0.1), [1.0, 2.55]
+    problem, method, times = SYSTEMS["masses"](), Gauss(s=4, tol=1e-9), [1.0, 2.55]
     rng = np.random.default_rng(5)
     starts = problem.y0 * rng.uniform(0.9, 1.1, (3, 1))
     vectors = rng.standard_normal((3, 4, 2))
