@@ -83,8 +83,8 @@ def calls(rounds: int) -> Times:
         return (time.perf_counter() - begun) / BATCH
 
     for text in CALLED:
-        _finished(integrate(problem, make_method(text), [SHORT]))
-    return _on_a_core({text: partial(sample, text) for text in CALLED}, rounds)
+        finished(integrate(problem, make_method(text), [SHORT]))
+    return on_a_core({text: partial(sample, text) for text in CALLED}, rounds)
 
 
 def steps(rounds: int) -> Times:
@@ -99,10 +99,10 @@ def steps(rounds: int) -> Times:
             count += 1
         stepped = (time.perf_counter() - begun) / count
         begun = time.perf_counter()
-        whole = _finished(integrate(problem, make_method(text), [LONG]))
+        whole = finished(integrate(problem, make_method(text), [LONG]))
         return max(stepped - (time.perf_counter() - begun) / whole.stats.steps, 0.0)
 
-    return _on_a_core({text: partial(sample, text) for text in STEPPED}, rounds)
+    return on_a_core({text: partial(sample, text) for text in STEPPED}, rounds)
 
 
 def first_results(rounds: int) -> Times:
@@ -115,7 +115,7 @@ def first_results(rounds: int) -> Times:
     return _taken({text: partial(sample, text) for text in FIRST}, rounds)
 
 
-def _on_a_core(samples: dict[str, Callable[[], float]], rounds: int) -> Times:
+def on_a_core(samples: dict[str, Callable[[], float]], rounds: int) -> Times:
     """Take samples in this process, on one core, after a round that is left out."""
     with machine.staying_on_a_core(), no_collection():
         interleaved([*samples.values()], 1)
@@ -166,7 +166,14 @@ def _fresh(method: str, caches: Path) -> float:
     return seconds
 
 
-def _finished(solution: Solution) -> Any:
+def finished(solution: Solution) -> Any:
+    """Return a solution that has come to its end.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If it has not.
+    """
     if solution.status is not Status.FINISHED:
         raise InputError(f"{solution.method!r} ended as {solution.status.value}: {solution.reason}")
     return solution

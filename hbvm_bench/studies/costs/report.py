@@ -14,7 +14,7 @@ from hbvm_bench.report.page import Results as Run
 from hbvm_bench.report.page import block
 from hbvm_bench.store.records import Record
 from hbvm_bench.studies.computations import Part, Results, Task, computing, load, sections_of
-from hbvm_bench.studies.costs import experiments
+from hbvm_bench.studies.costs import experiments, variations
 from hbvm_bench.studies.costs.experiments import CALLED, FIRST, ON_LATTICES, STEPPED, Iterations, Times
 from hbvm_bench.summaries import compilations, outcomes, standings
 from hbvm_bench.summaries.goals import other_work, ratio_text
@@ -91,6 +91,7 @@ def parts(*, quick: bool) -> list[Part]:
         Part("lattices", "Iterations on a lattice", lattices, _none, on_lattices),
         measured("calls", "A second call of integrate", experiments.calls, rounds, calls),
         measured("steps", "run.step() beyond the kernel's step", experiments.steps, rounds, steps),
+        variations.part(rounds),
         measured("first", "The first result of a fresh process", experiments.first_results, fresh, fresh_),
     ]
 
