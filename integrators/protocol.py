@@ -50,7 +50,8 @@ by `offers`; without it the method still integrates. The conformance kit checks 
 16. `TimeLimit`: after ``time_limit`` seconds ``advance`` returns the samples that it has computed, so that
     `integrate` can request all of them at once and Ctrl-C loses few.
 17. `Variations`: ``follow`` of a stepper propagates tangent vectors; ``variations`` are the vectors at the
-    samples of the last ``advance``.
+    samples of the last ``advance``. `BatchesAlong`: ``batch_along`` of a program integrates many initial
+    conditions with tangent vectors, if it ``goes_along`` with so many.
 18. `Gradients`: a stepper can ``record`` its steps, and ``adjoint`` integrates the adjoint equations over
     them backwards. `integrators.gradient` needs this and `Checkpoints`.
 19. `DoubleDouble`: ``start_pairs`` of a program starts from states with twice the digits of a double;
@@ -592,6 +593,40 @@ class Batches(Protocol):
         ...
 
 
+class BatchesAlong(Protocol):
+    """A program with a better way to integrate many starts with tangent vectors than one after another."""
+
+    def goes_along(self, directions: tuple[Array, Array]) -> bool:
+        """Whether it has for so many vectors; they are as for `batch_along`."""
+        ...
+
+    def batch_along(
+        self, Y0: ArrayLike, par: ArrayLike | None = None, *, times: ArrayLike, t0: float = 0.0,
+        directions: tuple[Array, Array], threads: int = 1,
+    ) -> Trajectories:  # fmt: skip
+        """Do what `Batches.batch` does, with vectors: the result has `Trajectories.variations`.
+
+        Parameters
+        ----------
+        Y0, par, times, t0
+            As for `Batches.batch`.
+        directions : pair of ndarray, shapes (n, dim, k), (n, n_par, k)
+            Parts of the tangent vectors in the starts and in the parameters.
+        threads : int
+            Threads to share the work among.
+
+        Returns
+        -------
+        Trajectories
+
+        Raises
+        ------
+        problems.errors.InputError
+            Where `goes_along` says that it cannot, and as `Batches.batch`.
+        """
+        ...
+
+
 class PreparedBatches(Protocol):
     """A program whose batches can be prepared, so that the integration can be timed separately."""
 
@@ -675,8 +710,8 @@ class AsHBVM(Protocol):
 
 CAPABILITIES: tuple[type, ...] = (
     Samplings, Destination, KeptError, Checkpoints, Interruptible, EventStepper,
-    Events, Actions, Batches, PreparedBatches, Threads, PieceSize, TimeLimit, Variations, Gradients,
-    DoubleDouble, LowParts, AsHBVM,
+    Events, Actions, Batches, BatchesAlong, PreparedBatches, Threads, PieceSize, TimeLimit, Variations,
+    Gradients, DoubleDouble, LowParts, AsHBVM,
 )  # fmt: skip
 """All of them."""
 

@@ -25,7 +25,7 @@ from integrators.kernel.implicit.workspace import Solver
 from integrators.kernel.pace import Pace
 from integrators.kernel.stepper import HBVMStepper
 from integrators.options import Count
-from integrators.protocol import Array, Status, Trajectories, UserError, sampling_named, telling
+from integrators.protocol import Array, Samples, Status, Trajectories, UserError, sampling_named, telling
 from integrators.refusals import check_batch, check_times
 from integrators.running.times import Counts, plan
 from problems.checks import checked
@@ -81,21 +81,25 @@ def prepare_batch(
     threads = checked("a batch", "threads", threads, Count)
     grid = check_times(times, t0)
     starts, parameters = check_batch(Y0, par, grid, program.system)
-    n, dim = starts.shape
-    counts = [np.zeros(n, dtype=np.int64) for _ in range(3)]
-    result = Batch(
-        grid, np.full((n, grid.size, dim), np.nan),
-        [Status.FINISHED] * n, [""] * n, np.full(n, grid[-1]), *counts,
-    )  # fmt: skip
-    work = _Work(program, result, starts, parameters, t0, sample or "partial", threads)
+    result = nothing_yet(grid, *starts.shape)
+    work = Work(program, result, starts, parameters, t0, sample or "partial", threads)
     lanes = program.in_lanes() if work.sample == "partial" else None
     if lanes is None:
         return work.all_alone
-    return partial(work.run, (_Own if lanes.varying else _Fixed).planned(lanes, work))
+    return partial(work.run, (_Own if lanes.varying else Fixed).planned(lanes, work))
+
+
+def nothing_yet(times: Array, n: int, dim: int) -> Batch:
+    """Return what a batch of n trajectories begins with."""
+    counts = [np.zeros(n, dtype=np.int64) for _ in range(3)]
+    return Batch(
+        times, np.full((n, times.size, dim), np.nan), [Status.FINISHED] * n, [""] * n, np.full(n, times[-1]),
+        *counts,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
-class _Work:
+class Work:
     """A batch under way; its trajectories may run on several threads."""
 
     program: BatchProgram
@@ -147,14 +151,15 @@ class _Work:
         """Integrate one trajectory by a stepper: its steps are its own, or its implicit solver."""
         result = self.result
         try:
-            stepper = self.program.start(self.starts[i], self.parameters[i], self.t0)
+            stepper = self.started(i)
         except UserError as raised:
             result.y[i], result.t_stop[i], result.status[i] = np.nan, self.t0, Status.USER_ERROR
             result.reason[i] = f"{raised} at the start, t = {self.t0!r}."
             return
         stepper.stop = self.stop
         samples = stepper.advance(result.t, sample=self.sample)
-        result.y[i, : samples.t.size], result.y[i, samples.t.size :] = samples.y, np.nan
+        result.y[i, : samples.t.size] = self.states(stepper, samples)
+        result.y[i, samples.t.size :] = np.nan
         result.status[i], result.reason[i] = samples.status, samples.reason
         result.t_stop[i] = result.t[-1] if samples.status is Status.FINISHED else stepper.t
         stats = stepper.stats
@@ -163,20 +168,28 @@ class _Work:
         if extra := telling(stats):
             result.extra[i] = extra
 
+    def started(self, i: int) -> HBVMStepper:
+        """Return a stepper at the start of a trajectory."""
+        return self.program.start(self.starts[i], self.parameters[i], self.t0)
+
+    def states(self, stepper: HBVMStepper, samples: Samples) -> Array:
+        """Return what the result has of samples that a stepper has made."""
+        return samples.y
+
 
 @dataclass(frozen=True, eq=False)
 class _InLanes:
     """What a batch needs to go in lanes."""
 
     lanes: Lanes
-    work: _Work
+    work: Work
     h: float
     numbers: dict[str, int]
     arrays: dict[str, Any]
     spare: list[Any] = field(default_factory=list)
 
     @classmethod
-    def planned(cls, lanes: Lanes, work: _Work) -> Self:
+    def planned(cls, lanes: Lanes, work: Work) -> Self:
         """Plan; allocate."""
         result, n = work.result, len(work.starts)
         h, more = cls.plan(lanes, work)
@@ -191,7 +204,7 @@ class _InLanes:
         return lanes_
 
     @classmethod
-    def plan(cls, lanes: Lanes, work: _Work) -> tuple[float, dict[str, Any]]:
+    def plan(cls, lanes: Lanes, work: Work) -> tuple[float, dict[str, Any]]:
         """Return the step that the matrix is for, and what else `Group` has."""
         raise NotImplementedError
 
@@ -245,11 +258,11 @@ class _InLanes:
                     done = self.advance(memory, pace.steps) == 1
 
 
-class _Fixed(_InLanes):
+class Fixed(_InLanes):
     """Fixed steps: a group of trajectories after the other."""
 
     @classmethod
-    def plan(cls, lanes: Lanes, work: _Work) -> tuple[float, dict[str, Any]]:
+    def plan(cls, lanes: Lanes, work: Work) -> tuple[float, dict[str, Any]]:
         times, t0 = work.result.t, work.t0
         h = -work.program.h if times[-1] < t0 else work.program.h
         targets, parts = plan(times, np.full(times.size, t0), h)
@@ -264,7 +277,7 @@ class _Own(_InLanes):
     """Adaptive steps: in each lane one trajectory after the other."""
 
     @classmethod
-    def plan(cls, lanes: Lanes, work: _Work) -> tuple[float, dict[str, Any]]:
+    def plan(cls, lanes: Lanes, work: Work) -> tuple[float, dict[str, Any]]:
         return 1.0, {"all_steps": np.zeros(len(work.starts), np.int64)}
 
     def memory(self) -> Any:

@@ -11,9 +11,10 @@ from numpy.typing import ArrayLike
 from integrators.caveats import sees_kinks
 from integrators.events.event import Event
 from integrators.kernel import tables
+from integrators.kernel.along import batch_along
 from integrators.kernel.batch import Batch, prepare_batch
 from integrators.kernel.context import Context, Shape, blocks, width_of_blocks
-from integrators.kernel.ensemble.prepared import Lanes, lanes_of
+from integrators.kernel.ensemble.prepared import Lanes, compiled_lanes, lanes_of
 from integrators.kernel.events.engine import look
 from integrators.kernel.events.functions import Action, EventFunction
 from integrators.kernel.fixed import FixedStepper
@@ -39,6 +40,7 @@ from integrators.kernel.step.rule import (
     UNTESTED,
 )
 from integrators.kernel.stepper import HBVMStepper
+from integrators.kernel.tangent.lanes import VectorLanes
 from integrators.kernel.varying import AdaptiveStepper
 from integrators.protocol import Array, Compiled, sampling_named
 from integrators.refusals import check_parameters, check_start, check_state
@@ -169,6 +171,7 @@ class HBVMProgram(Compiled):
         self.from_cache = all(part.from_cache for part in parts if part is not None)
         self._workspace: Workspace | None = None
         self._in_lanes: tuple[Lanes | None] | None = None
+        self._along: dict[tuple[int, bool], VectorLanes | None] = {}
         self._many: HBVMProgram | None = None
         if self.solver.strategy == ALWAYS_IMPLICIT:
             self.implicit()
@@ -313,6 +316,63 @@ class HBVMProgram(Compiled):
             self._in_lanes = (lanes_,)
         return self._in_lanes[0]
 
+    def in_lanes_along(self, count: int, moves: bool) -> VectorLanes | None:
+        """Return the method on trajectories in lanes, each with so many tangent vectors, if it has one.
+
+        Parameters
+        ----------
+        count : int
+            Vectors of each trajectory.
+        moves : bool
+            Whether they have parts in the parameters.
+
+        Returns
+        -------
+        VectorLanes or None
+            ``None`` for adaptive steps, whose lengths would depend on the vectors' errors, for what has no
+            lanes or no formula, and for more components and vectors than `VectorLanes.take` allows.
+        """
+        if (count, moves) not in self._along:
+            steps_are_fixed = not (self.varying or self.projected or self.kept)
+            can = steps_are_fixed and self.lanes and self.system.traced
+            lanes_, seconds = None, 0.0
+            if can and self.solver.strategy != ALWAYS_IMPLICIT:
+                lanes_, seconds = self._compiled_along(count, moves)
+            self.compile_seconds += seconds
+            self.from_cache = self.from_cache and (lanes_ is None or lanes_.from_cache)
+            self._along[count, moves] = lanes_
+        return self._along[count, moves]
+
+    def _compiled_along(self, count: int, moves: bool) -> tuple[VectorLanes | None, float]:
+        """Return the lanes for so many vectors, if they are few enough, and the seconds that took."""
+        constants, unit = self.constants, self.shape.unit
+        if self.second and moves and not self._velocity_is_fixed:
+            # q' = v(par) p, whose derivative is no multiple of a momentum
+            constants, unit = tables.constants(constants.k, constants.s, False, constants.lanes), True
+        if not VectorLanes.take(self.system, constants, count):
+            return None, 0.0
+        return compiled_lanes(lambda: VectorLanes(self.system, constants, unit, count, moves))
+
+    @property
+    def _velocity_is_fixed(self) -> bool:
+        """Whether velocities by momenta do not depend on parameters."""
+        anywhere = self._velocity_scale(np.full(self.system.n_par, np.nan))
+        return bool(np.isfinite(anywhere).all())
+
+    def goes_along(self, directions: tuple[Array, Array]) -> bool:
+        """Whether `batch_along` has lanes for such vectors; compiled the first time."""
+        return self.in_lanes_along(*_vectors_of(directions)) is not None
+
+    def batch_along(
+        self, Y0: ArrayLike, par: ArrayLike | None = None, *, times: ArrayLike, t0: float = 0.0,
+        directions: tuple[Array, Array], threads: int = 1,
+    ) -> Batch:  # fmt: skip
+        """Integrate many starts with tangent vectors; see `integrators.protocol.BatchesAlong`."""
+        lanes = self.in_lanes_along(*_vectors_of(directions))
+        if lanes is None:
+            raise InputError(f"{self.description} has no lanes for such vectors; integrate one by one.")
+        return batch_along(self, lanes, Y0, par, times, check_start(t0), directions, threads)
+
     def implicit(self) -> Workspace:
         """Return memory for the implicit solver; its code is compiled, or loaded, the first time."""
         if self._workspace is None:
@@ -405,6 +465,11 @@ class HBVMProgram(Compiled):
             speed[self.shape.block] = np.where(velocity == 0.0, 1.0, np.abs(velocity))
             self._known_velocity = key, velocities = key, (velocity, speed, 1.0 / speed)
         return velocities
+
+
+def _vectors_of(directions: tuple[Array, Array]) -> tuple[int, bool]:
+    """Return how many vectors each trajectory has, and whether they have parts in the parameters."""
+    return directions[0].shape[2], bool(directions[1].any())
 
 
 class AdaptiveProgram(HBVMProgram):

@@ -5,12 +5,17 @@ from typing import Any
 
 from integrators.kernel.context import Context
 from integrators.kernel.native.memory import Content
+from integrators.kernel.tangent.group import Directions
+from integrators.kernel.tangent.vectors import Vectors
 
 PAIRS = 4
 """That are spare at most: more trajectories at a time have memory of their own."""
 
 BYTES = 1 << 18
 """In a context that is spare, at most: beside the steps of such a system a fresh one costs little."""
+
+BYTES_OF_VECTORS = 1 << 20
+"""In the tangent vectors of a pair that is spare, at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +43,24 @@ class Pair:
     def __init__(self, own: Context, partial: Context):
         self.own, self.partial = own, partial
         self.small = own.nbytes <= BYTES
+        self._vectors: dict[tuple[int, int, bool], Vectors] = {}
+
+    def kept_vectors(self, directions: Directions) -> Vectors | None:
+        """Return the memory of as many vectors as these, that followed a trajectory here; else ``None``."""
+        return self._vectors.get((*directions.state.shape, directions.move_parameters))
+
+    def keep_vectors(self, vectors: Vectors) -> None:
+        """Keep their memory for others, before that of the ones kept already."""
+        kept, self._vectors, room = {vectors.kind: vectors} | self._vectors, {}, BYTES_OF_VECTORS
+        for kind, member in kept.items():
+            room -= member.nbytes
+            if room >= 0:
+                self._vectors[kind] = member
+
+    def leave_solvers(self) -> None:
+        """Forget vectors that have implicit solvers, whose memory is larger than theirs."""
+        if any(vectors.solvers for vectors in self._vectors.values()):
+            self._vectors = {}
 
     def keep(self, par: bytes) -> None:
         """Take what both hold for what a trajectory with these parameters begins with."""
@@ -74,4 +97,5 @@ class Spare:
     def give(self, pair: Pair) -> None:
         """Take the pair of a trajectory that is over."""
         if pair.small and len(self._pairs) < self._most:
+            pair.leave_solvers()
             self._pairs.append(pair)

@@ -39,7 +39,8 @@ from integrators.kernel.searches import LastingSearch
 from integrators.kernel.spare import Pair, Spare
 from integrators.kernel.step.engine import steps
 from integrators.kernel.tables import Constants
-from integrators.kernel.tangent.vectors import Directions, Vectors
+from integrators.kernel.tangent.group import Directions
+from integrators.kernel.tangent.vectors import Vectors
 from integrators.protocol import SAMPLINGS, Array, Samples, Stats, Status, UserError, sampling_named
 from integrators.refusals import check_times, one_thread
 from integrators.running.checkpoints import Identity
@@ -174,8 +175,8 @@ class HBVMStepper(ABC):
         self._begin(y, t0)
 
     def __del__(self) -> None:
-        # A search for events, vectors and records know the memory too, and may be there longer.
-        if self._pair is None or self._vectors is not None or self._recorded:
+        # A search for events and records know the memory too, and may be there longer.
+        if self._pair is None or self._recorded:
             return
         if self.search is None:
             self._program.spare.give(self._pair)
@@ -196,16 +197,20 @@ class HBVMStepper(ABC):
     def follow(self, state: ArrayLike, parameters: ArrayLike) -> None:
         """Let tangent vectors follow the trajectory from here on; see `integrators.protocol.Variations`."""
         self._check_derivatives("variations")
-        system, program = self._program.system, self._program
-        started = binary.clock()
-        directions = Directions(*(np.array(part, dtype=np.float64) for part in (state, parameters)))
+        directions = Directions(np.array(state, dtype=np.float64), np.array(parameters, dtype=np.float64))
         if self._vectors and self._vectors.fits(directions):
             self._vectors.put(directions.state)
-        else:
+            return
+        assert self._pair is not None
+        self._vectors = self._pair.kept_vectors(directions)
+        if self._vectors is None:
+            system, program, started = self._program.system, self._program, binary.clock()
             self._vectors = Vectors(system, (self._context, self._partial), directions, program.vectors)
-            if self._implicit is not None:
-                self._vectors.solve_by(self._implicit)
-        program.compile_seconds += binary.clock() - started
+            self._pair.keep_vectors(self._vectors)
+            program.compile_seconds += binary.clock() - started
+        self._vectors.begin(directions)
+        if self._implicit is not None:
+            self._vectors.solve_by(self._implicit)
 
     def _check_derivatives(self, label: str) -> None:
         """Refuse what needs the derivatives of the steps where these have none."""

@@ -119,8 +119,11 @@ def integrate_many(
         last digits of a mean depend on ``piece``; the results do not depend on threads or workers.
     variations : array_like, shape (dim, k) or (n, dim, k), or str, or sequence of str, optional
         As for `integrate`, at the start of each trajectory, or tangent vectors of each: ``variations`` of
-        the result has the shape (n, m, dim, k). Trajectories are then integrated one after another, or one in
-        each thread.
+        the result has the shape (n, m, dim, k). With a fixed step size trajectories are integrated in SIMD
+        lanes with their vectors, if the components of a trajectory and its vectors are at most 64 (half of
+        them in second-order form); the result is that of `integrate` up to rounding. With an adaptive step
+        size, where the errors of the vectors would change the steps, and for larger systems they are
+        integrated one after another, or one in each thread.
     executor : concurrent.futures.Executor, optional
         Executor that runs the integrations: a ``ProcessPoolExecutor``,
         ``dask.distributed.Client().get_executor()``, ... A piece whose worker dies is submitted once more; if
@@ -217,7 +220,7 @@ def integrate_many(
         )
         pieces_ = Remote(executor, problem, method, task, *more).run(pieces)
     else:
-        batches = start is None and directions is None and in_batches(program, grid, sample)
+        batches = start is None and in_batches(program, grid, sample, directions)
         few = program.piece if offers(program, PieceSize) else FIRST * threads
         soon = SOON if progress or checkpoint is not None else UNWATCHED
         pieces_ = _local(here, gathered, few if batches else threads, size, soon)

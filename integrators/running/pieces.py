@@ -20,6 +20,7 @@ from integrators.events.members import follow, own_times
 from integrators.protocol import (
     Array,
     Batches,
+    BatchesAlong,
     Destination,
     Interruptible,
     MethodBase,
@@ -171,9 +172,14 @@ def _single(
     return result
 
 
-def in_batches(program: Program, times: Array, sample: str | None) -> bool:
-    """Whether a program integrates such trajectories together."""
-    return sample is None and times.ndim == 1 and offers(program, Batches)
+def in_batches(
+    program: Program, times: Array, sample: str | None, directions: tuple[Array, Array] | None
+) -> bool:
+    """Whether a program integrates such trajectories, with such tangent vectors, together."""
+    if sample is not None or times.ndim != 1 or not offers(program, Batches):
+        return False
+    along: Any = program
+    return directions is None or (offers(program, BatchesAlong) and along.goes_along(directions))
 
 
 def integrate_with(
@@ -187,8 +193,10 @@ def integrate_with(
     directions: tuple[Array, Array] | None = None,
 ) -> Trajectories:
     """Integrate some trajectories: in lanes where the program can and the times are those of all."""
-    if directions is not None or not in_batches(program, times, sample):
+    if not in_batches(program, times, sample, directions):
         return alone(program, starts, par, times, t0, threads, sample, directions)
+    if directions is not None:
+        return program.batch_along(starts, par, times=times, t0=t0, directions=directions, threads=threads)
     options = {"threads": threads} if offers(program, Threads) and program.threaded else {}
     return program.batch(starts, par, times=times, t0=t0, **options)
 

@@ -18,6 +18,7 @@ from integrators.protocol import MethodBase, check_is_problem
 from integrators.testing.capabilities import (
     a_destination_leaves_the_samples_alone,
     adjoints_are_what_tangents_say,
+    batches_along_are_single_trajectories,
     batches_are_single_trajectories,
     comes_back_after_its_time,
     comes_back_when_it_is_stopped,
@@ -95,6 +96,7 @@ CHECKS: tuple[Check, ...] = (
     comes_back_when_it_is_stopped,
     finds_events_beside_its_steps,
     events_may_change_the_state,
+    batches_along_are_single_trajectories,
     batches_are_single_trajectories,
     prepared_batches_are_batches,
     threads_change_no_bits,

@@ -14,6 +14,7 @@ from integrators.protocol import (
     Actions,
     AsHBVM,
     Batches,
+    BatchesAlong,
     Checkpoints,
     Destination,
     DoubleDouble,
@@ -282,6 +283,27 @@ def batches_are_single_trajectories(method: MethodBase, problem: Problem) -> str
     return None
 
 
+def batches_along_are_single_trajectories(method: MethodBase, problem: Problem) -> str | None:
+    """Check that tangent vectors of a batch are those that follow its trajectories alone."""
+    program: Any = method.compile(problem.system)
+    if not offers(program, BatchesAlong):
+        return "its batches have no tangent vectors"
+    starts, par = np.outer([1.0, 1.001, 0.999], problem.y0), np.tile(problem.par, (3, 1))
+    dim, n_par = problem.system.dim, problem.system.n_par
+    directions = np.tile(np.eye(dim)[:, :2], (3, 1, 1)), np.zeros((3, n_par, min(dim, 2)))
+    if not program.goes_along(directions):
+        return "its batches have no such tangent vectors"
+    options: dict[str, Any] = {"times": regular(problem, 9)[1:2], "t0": problem.t0}
+    batch = program.batch_along(starts, par, **options, directions=directions)
+    for y0, vectors, state, parameters in zip(starts, batch.variations, *directions, strict=True):
+        stepper = program.start(y0, problem.par, problem.t0)
+        stepper.follow(state, parameters)
+        stepper.advance(options["times"])
+        miss = float(np.max(np.abs(stepper.variations - vectors)))
+        require(miss < BATCH_BOUND, f"vectors of a batch are those of its trajectories, but for {miss:.1e}")
+    return None
+
+
 def prepared_batches_are_batches(method: MethodBase, problem: Problem) -> str | None:
     """Check that a prepared batch is bitwise identical to one that was not prepared."""
     program: Any = method.compile(problem.system)
@@ -358,6 +380,7 @@ CHECK_OF: dict[type, Callable[[MethodBase, Problem], str | None]] = {
     Actions: events_may_change_the_state,
     EventStepper: finds_events_beside_its_steps,
     Batches: batches_are_single_trajectories,
+    BatchesAlong: batches_along_are_single_trajectories,
     PreparedBatches: prepared_batches_are_batches,
     Threads: threads_change_no_bits,
     PieceSize: the_size_of_a_piece_is_a_count,

@@ -17,8 +17,9 @@ from problems.trace.graph import PAR, STATE, Affine, Graph, Loop, Node, reachabl
 
 
 def forward(
-    function: Function, *, size: int, directions: int, parameters: int | None = None, name: str
-) -> Function:
+    function: Function, *, size: int, directions: int, parameters: int | None = None, name: str,
+    beside: bool = False,
+) -> Function:  # fmt: skip
     """Return the derivatives of a function along directions, a function itself.
 
     Parameters
@@ -33,6 +34,8 @@ def forward(
         Length of the parameter vector, where directions have a part in it; by default they have none.
     name : str
         What generated code and messages call it.
+    beside : bool
+        Whether the outputs of ``function`` itself are to follow those of the derivatives.
 
     Returns
     -------
@@ -61,6 +64,10 @@ def forward(
                 for term in terms
                 if (node := rule.slope(term.node, direction)) is not None
             )
+    if beside:
+        products += [
+            tuple(Term(rule.value(term.node), term.key) for term in terms) for terms in function.outputs
+        ]
     loops: list[tuple[Loop, tuple[LoopTerm, ...]]] = []
     for loop, entries in function.loops:
         moved: list[LoopTerm] = []
@@ -69,6 +76,11 @@ def forward(
                 node = rule.slope(entry.node, direction)
                 if node is not None:
                     moved.append(LoopTerm(entry.index.shifted(outputs * direction), node))
+        if beside:
+            moved += [
+                LoopTerm(entry.index.shifted(outputs * directions), rule.value(entry.node))
+                for entry in entries
+            ]
         if moved:
             loops.append((rule.graph.loop(loop.rows), tuple(moved)))
     return Function(rule.graph, tuple(products), tuple(loops), name)

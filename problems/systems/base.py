@@ -120,7 +120,7 @@ class System:
     def _start_memories(self) -> None:
         self._jacobians: dict[str, Jacobian | None] = {}
         self._gradients: dict[Function, Function] = {}
-        self._tangents: dict[tuple[str, int, bool], Function] = {}
+        self._tangents: dict[tuple[str, int, bool, bool], Function] = {}
         self._products: dict[Variables, Function] = {}
         self._together: dict[tuple[Function, ...], Function] = {}
 
@@ -445,7 +445,9 @@ class System:
             self._jacobians[function] = jacobian(self.function(function), name) if self.traced else None
         return self._jacobians[function]
 
-    def tangent(self, name: str, directions: int, *, parameters: bool = False) -> Function:
+    def tangent(
+        self, name: str, directions: int, *, parameters: bool = False, beside: bool = False
+    ) -> Function:
         """Return the derivatives of a function along directions; see `problems.calculus.forward`.
 
         Parameters
@@ -456,19 +458,21 @@ class System:
             Their number, n >= 1.
         parameters : bool
             Whether directions have a part in the parameters too.
+        beside : bool
+            Whether the function itself is to follow its derivatives.
 
         Raises
         ------
         problems.errors.InputError
             For another name, or a system that has no such function.
         """
-        key = name, directions, parameters
+        key = name, directions, parameters, beside
         if key not in self._tangents:
             function = self.function(name)
             self._tangents[key] = forward(
                 function, size={"field": self.dim, "force": len(function.outputs)}.get(name, 0),
                 directions=directions, parameters=self.n_par if parameters else None,
-                name=f"{name}_along_{directions}",
+                name=f"{name}_along_{directions}", beside=beside,
             )  # fmt: skip
         return self._tangents[key]
 

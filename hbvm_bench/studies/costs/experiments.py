@@ -83,7 +83,7 @@ def calls(rounds: int) -> Times:
         return (time.perf_counter() - begun) / BATCH
 
     for text in CALLED:
-        _finished(integrate(problem, make_method(text), [SHORT]))
+        finished(integrate(problem, make_method(text), [SHORT]))
     return taken_on_a_core({text: partial(sample, text) for text in CALLED}, rounds)
 
 
@@ -99,7 +99,7 @@ def steps(rounds: int) -> Times:
             count += 1
         stepped = (time.perf_counter() - begun) / count
         begun = time.perf_counter()
-        whole = _finished(integrate(problem, make_method(text), [LONG]))
+        whole = finished(integrate(problem, make_method(text), [LONG]))
         return max(stepped - (time.perf_counter() - begun) / whole.stats.steps, 0.0)
 
     return taken_on_a_core({text: partial(sample, text) for text in STEPPED}, rounds)
@@ -158,7 +158,14 @@ def _fresh(method: str, caches: Path) -> float:
     return seconds
 
 
-def _finished(solution: Solution) -> Any:
+def finished(solution: Solution) -> Any:
+    """Return a solution that has come to its end.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If it has not.
+    """
     if solution.status is not Status.FINISHED:
         raise InputError(f"{solution.method!r} ended as {solution.status.value}: {solution.reason}")
     return solution

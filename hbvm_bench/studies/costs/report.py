@@ -14,7 +14,7 @@ from hbvm_bench.report.page import Results as Run
 from hbvm_bench.report.page import block
 from hbvm_bench.store.records import Record
 from hbvm_bench.studies.computations import Part, Results, Task, computing, load, sections_of
-from hbvm_bench.studies.costs import experiments
+from hbvm_bench.studies.costs import experiments, variations
 from hbvm_bench.studies.costs.beside_c import ECCENTRICITY, IN_C, OURS, SOURCE, STEP, BesideC, beside_c
 from hbvm_bench.studies.costs.experiments import CALLED, FIRST, ON_LATTICES, STEPPED, Iterations, Times
 from hbvm_bench.summaries import compilations, outcomes, standings
@@ -101,6 +101,7 @@ def parts(*, quick: bool) -> list[Part]:
             _none,
             lambda results: [("the steps in C", lambda: in_c(results["times"]))],
         ),
+        variations.part(rounds),
         measured("first", "The first result of a fresh process", experiments.first_results, fresh, fresh_),
     ]
 

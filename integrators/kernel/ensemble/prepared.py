@@ -1,7 +1,8 @@
 """A method's coefficients for trajectories in lanes, and the memory of groups of them."""
 
+from collections.abc import Callable
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +11,7 @@ from integrators.kernel import tables
 from integrators.kernel.context import width_of_blocks
 from integrators.kernel.ensemble.engine import run, run_own
 from integrators.kernel.ensemble.group import Group
-from integrators.kernel.ensemble.steps import Form, compile_steps
+from integrators.kernel.ensemble.steps import Blocks, Form, compile_steps
 from integrators.kernel.native import binary, machine
 from integrators.kernel.native.memory import Numbers, aligned
 from integrators.kernel.tables import Constants
@@ -22,6 +23,8 @@ LANES = 8  # of a register of AVX-512
 SOON = ("const", "symbol", "index", "add", "sub", "mul", "neg", "pow", "sum")  # operations not waited for
 STAGES = 16  # at most: their sums are written out
 ROOM = 4096  # rows of all stages, at most: beyond, a group of trajectories does not fit in the nearest caches
+
+Made = TypeVar("Made")
 
 
 class Lanes:
@@ -47,20 +50,22 @@ class Lanes:
     """
 
     def __init__(self, system: System, constants: Constants, second: bool, unit: bool, varying: bool):
-        self.system, self.second, self._constants = system, second, constants
-        self.unit, self.varying = unit and not varying, varying
         self.rows = system.dof if second and system.dof is not None else system.dim
-        width = width_of_blocks(system)
-        starts = [0] if second or system.dof is None else [0, system.dof]
-        size = self.rows // len(starts)
-        groups = tuple((start, size // width, width) for start in starts)
-        self.k = constants.k
+        self.dim, self.parameters = system.dim, system.n_par
+        groups = groups_of(system, second, self.rows)
+        self._compile(system, constants, "force" if second else "field", second, unit, varying, groups)
+
+    def _compile(
+        self, system: System, constants: Constants, quantity: emit.Quantity, second: bool, unit: bool,
+        varying: bool, groups: Blocks, vectors: Blocks = (),
+    ) -> None:  # fmt: skip
+        """Compile the steps around a function of stages of `rows` components."""
+        self.system, self.second, self._constants = system, second, constants
+        self.unit, self.varying, self.k = unit and not varying, varying, constants.k
         self.width = width_for(system, second, self.rows, varying)
         judged = tables.degrees_judged(constants.k, constants.s)
-        self._code = compile_steps(
-            system,
-            Form(self.width, self.k, self.rows, second, self.unit, varying, judged, groups),
-        )
+        form = Form(self.width, self.k, self.rows, second, self.unit, varying, judged, groups, vectors)
+        self._code = compile_steps(system, form, quantity)
         loop = (run_own if varying else run).code()
         self.from_cache = self._code.from_cache and loop.from_cache
         self._scaled: dict[float, Numbers] = {}
@@ -129,10 +134,9 @@ class Lanes:
         numbers, arrays : dict
             What `Group` is to know of the trajectories.
         """
-        system = self.system
         shape = {
-            "code": self._code.address, "lanes": self.width, "rows": self.rows, "dim": system.dim,
-            "parameters": system.n_par, "k": self.k, **numbers,
+            "code": self._code.address, "lanes": self.width, "rows": self.rows, "dim": self.dim,
+            "parameters": self.parameters, "k": self.k, **numbers,
         }  # fmt: skip
         matrix = self._matrix(h)
         group, side = (Group(shape, {**self._fixed, **arrays, "matrix": matrix}) for _ in range(2))
@@ -140,6 +144,13 @@ class Lanes:
         group.h[:], group.t0[:] = h, t0
         group.start_time = t0
         return group, side
+
+
+def groups_of(system: System, second: bool, rows: int) -> Blocks:
+    """Return the groups of blocks of a stage of so many components, as `Form.groups` has them."""
+    width = width_of_blocks(system)
+    starts = [0] if second or system.dof is None else [0, system.dof]
+    return tuple((start, rows // len(starts) // width, width) for start in starts)
 
 
 def width_for(system: System, second: bool, rows: int, varying: bool) -> int:
@@ -166,16 +177,22 @@ def lanes_of(
     system: System, constants: Constants, second: bool, unit: bool, varying: bool
 ) -> tuple[Lanes | None, float]:
     """Return a method on trajectories in lanes, or ``None`` where it cannot be; and the seconds that took."""
+    if not Lanes.takes(system, constants, second):
+        return None, 0.0
+    return compiled_lanes(lambda: Lanes(system, constants, second, unit, varying))
+
+
+def compiled_lanes(make: Callable[[], Made]) -> tuple[Made | None, float]:
+    """Return what a function compiles, or ``None`` where numba cannot; and the seconds that took."""
     started = binary.clock()
     lanes_ = None
-    if Lanes.takes(system, constants, second):
-        try:
-            lanes_ = Lanes(system, constants, second, unit, varying)
-        except Exception as error:
-            from numba.core.errors import NumbaError  # has been imported to compile
+    try:
+        lanes_ = make()
+    except Exception as error:
+        from numba.core.errors import NumbaError  # has been imported to compile
 
-            if not isinstance(error, NumbaError):
-                raise
+        if not isinstance(error, NumbaError):
+            raise
     return lanes_, binary.clock() - started
 
 

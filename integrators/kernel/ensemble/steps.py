@@ -36,6 +36,10 @@ UNROLLED = 640  # products of a sweep up to which stages and rows are written ou
 ABREAST = 2  # rows of a product side by side: their sums stay in registers, and share its matrix
 
 
+Blocks = tuple[tuple[int, int, int], ...]
+"""First row, number of blocks and rows of a block, of groups of blocks."""
+
+
 @dataclass(frozen=True)
 class Form:
     """What the code of a step depends on besides the field.
@@ -55,6 +59,8 @@ class Form:
         Degrees of the Legendre coefficients that such a step is judged by; see `tables.degrees_judged`.
     groups : tuple of tuple of int
         First row, number of blocks and rows of a block, of groups of blocks (positions, momenta).
+    vectors : tuple of tuple of int
+        The same of tangent vectors, which may begin at 0: they are measured after each sweep.
     """
 
     lanes: int
@@ -64,18 +70,27 @@ class Form:
     unit: bool
     varying: bool
     judged: tuple[int, ...]
-    groups: tuple[tuple[int, int, int], ...]
+    groups: Blocks
+    vectors: Blocks = ()
 
 
-def compile_steps(system: System, form: Form) -> binary.Native:
+def compile_steps(system: System, form: Form, quantity: emit.Quantity) -> binary.Native:
     """Compile ``void(group, count)``, or load it: as many steps of a `Group`, for a field on lanes.
+
+    Parameters
+    ----------
+    system : System
+        Whose function the steps evaluate.
+    form : Form
+        Of the steps.
+    quantity : str or Function
+        The function, as for `field.compile_field`.
 
     Raises
     ------
     numba.core.errors.NumbaError
         If the field cannot be compiled on lanes.
     """
-    quantity = "force" if form.second else "field"
     source = emit.source(system, quantity, "numba")
     modules = binary.sources(*field.SOURCES, "ensemble", "step")
     name = store.key("ensemble", source.text, repr(form), modules)
@@ -227,28 +242,49 @@ class Steps(Writer):
 
         The size of a block is the largest at the start of the step and, about, at its end.
         """
+        self.invert_sizes(self.form.groups, lambda d, _: self.extent(d))
+
+    def sizes_of_vectors(self) -> None:
+        """Set the same of tangent vectors, which are also as large as the newest values move the stages."""
+
+        def own(d: Index, weight: Value) -> Value:
+            last = self.get(self.values, self.at(self.form.k - 1, self.form.rows, d))
+            return self.extent(d).max((weight * last).absolute())
+
+        self.invert_sizes(self.form.vectors, own)
+
+    def extent(self, d: Index) -> Value:
+        """Return the size of a component at the start of the step and, about, at its end."""
+        y = self.get(self.state, d)
+        if self.form.second:
+            moved, _ = self.drift(d, self.h * self.get(self.velocity, d))
+        else:
+            moved = self.h * self.get(self.values, self.at(self.form.k - 1, self.form.rows, d))
+        return y.absolute().max((y + moved).absolute())
+
+    def invert_sizes(self, groups: Blocks, own: Callable[[Index, Value], Value]) -> None:
+        """Write the weights of changes in groups of blocks, by ``own(d, weight)``, the size of a component.
+
+        The weight turns a change of the values into one of the stages.
+        """
         from integrators.kernel.step.size import inverse_sizes, least_part  # imports numba
 
         form = self.form
         least = least_part(form.varying)
         reach = Value(self.b, splat(self.b, self.b.load(self.word(Group.slots["reach"], DOUBLE)), form.lanes))
 
-        def own(d: Index) -> Value:
-            y = self.get(self.state, d)
-            if form.second:
-                moved, _ = self.drift(d, self.h * self.get(self.velocity, d))
-            else:
-                moved = self.h * self.get(self.values, self.at(form.k - 1, form.rows, d))
-            return y.absolute().max((y + moved).absolute())
+        def weight_of(d: Index) -> Value:
+            return reach if form.unit else self.get(self.factor, d).absolute() * reach
 
-        for first, blocks, width in form.groups:
+        for first, blocks, width in groups:
             largest = self.variable(self.kind, self.zero.value)
 
             def measure(block: Index, first: int = first, width: int = width, largest: Any = largest) -> None:
                 start = self.at(block, width, first)
                 size = self.zero
                 for i in range(width):
-                    size = size.max(own(self.at(start, 1, i)))
+                    d = self.at(start, 1, i)
+                    size = size.max(own(d, weight_of(d)))
                 self.put(size, self.size, start)
                 self.b.store(Value(self.b, self.b.load(largest)).max(size).value, largest)
 
@@ -260,7 +296,7 @@ class Steps(Writer):
                 inverses = inverse_sizes(self.get(self.size, start), top, least, self.zero, self.zero)
                 for i in range(width):
                     d = self.at(start, 1, i)
-                    weight = reach if form.unit else self.get(self.factor, d).absolute() * reach
+                    weight = weight_of(d)
                     self.put(weight * inverses[0], self.strict, d)
                     self.put(weight * inverses[1], self.floored, d)
 
@@ -411,6 +447,8 @@ class Steps(Writer):
         from integrators.kernel.step.stopping import further, judge, left_over, stagnates  # imports numba
 
         b, form = self.b, self.form
+        if form.vectors:
+            self.sizes_of_vectors()
         change, floored = (self.variable(self.kind, self.zero.value) for _ in range(2))
 
         def largest(d: Index) -> None:

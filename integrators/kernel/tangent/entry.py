@@ -114,6 +114,9 @@ def differentiate(ctx, trajectory, vectors, earlier, part, pulls):
     if ctx.varying:
         set_step(ctx, ctx.h)
     vectors.tables.matrix = ctx.tables.matrix
+    if not part:  # of the same direction
+        vectors.tables.extrapolation = ctx.tables.extrapolation
+        vectors.tables.extrapolation_two = ctx.tables.extrapolation_two
     show_stages(ctx, vectors)
     if ctx.solved == BY_INCREMENT:
         if part:

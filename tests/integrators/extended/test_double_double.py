@@ -228,6 +228,7 @@ def test_conforms(check):
         testing.the_size_of_a_piece_is_a_count,
         testing.comes_back_after_its_time,
         testing.tangents_follow_and_change_nothing,
+        testing.batches_along_are_single_trajectories,
         testing.adjoints_are_what_tangents_say,
         testing.is_the_hbvm_that_it_names,
         testing.failure_is_a_status,

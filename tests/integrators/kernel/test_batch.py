@@ -10,7 +10,7 @@ import problems
 from integrators import HBVM, integrate
 from integrators.coefficients.legendre import legendre
 from integrators.kernel import batch
-from integrators.kernel.batch import _Work
+from integrators.kernel.batch import Work
 from integrators.kernel.ensemble import prepared
 from integrators.kernel.ensemble.control import in_powers
 from integrators.kernel.program import AdaptiveProgram, HBVMProgram
@@ -219,13 +219,13 @@ def test_threads_share_the_work_of_an_implicit_solver_too(monkeypatch, solver):
     problem = problems.load("kepler", e=0.5)
     program = HBVMProgram(problem.system, k=8, s=4, h=0.1, solver=solver)
     starts = problem.y0 * (1 + 0.05 * rng.normal(size=(6, 4)))
-    alone, inner, names = program.batch(starts, times=[1.0]).y, _Work.alone, set()
+    alone, inner, names = program.batch(starts, times=[1.0]).y, Work.alone, set()
 
     def watched(self, i):
         names.add(current_thread().name)
         return inner(self, i)
 
-    monkeypatch.setattr(_Work, "alone", watched)
+    monkeypatch.setattr(Work, "alone", watched)
     assert np.array_equal(program.batch(starts, times=[1.0], threads=2).y, alone)
     assert names
     assert current_thread().name not in names

@@ -89,9 +89,6 @@ def test_the_memory_is_the_same_one():
 def test_what_others_know_stays_theirs():
     made = prepared(HBVM(), KEPLER.system)
     made.spare = spare.Spare()
-    first = made.start(KEPLER.y0, KEPLER.par)
-    first.follow(np.eye(4), np.zeros((0, 4)))
-    del first
     records = made.start(KEPLER.y0, KEPLER.par)
     records.record(records.recorder(8))
     del records

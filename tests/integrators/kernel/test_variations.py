@@ -332,7 +332,7 @@ def test_an_ensemble_has_those_of_each_trajectory(tmp_path):
 
 def test_each_trajectory_of_an_ensemble_has_vectors_of_its_own(tmp_path):
     """The bits of single trajectories, also from a file and after a break."""
-    problem, method, times = SYSTEMS["masses"](), Gauss(s=4, h=0.1), [1.0, 2.55]
+    problem, method, times = SYSTEMS["masses"](), Gauss(s=4, tol=1e-9), [1.0, 2.55]
     rng = np.random.default_rng(5)
     starts = problem.y0 * rng.uniform(0.9, 1.1, (3, 1))
     vectors = rng.standard_normal((3, 4, 2))
@@ -375,3 +375,10 @@ def test_what_cannot_be_is_said(keywords, words):
 def test_line_integrals_have_none():
     with pytest.raises(InputError, match="Runge-Kutta"):
         integrate(problems.load("rigid_body"), HBVM(k=4, s=2, h=0.1), [1.0], variations="y0")
+
+
+def test_backwards_their_first_values_are_those_of_a_step_backwards():
+    problem = problems.load("double_pendulum")
+    made = integrate(problem, Gauss(s=8, h=0.05), [-10.0], variations="y0")
+    counted = made.stats.extra["variations"]["iterations"]
+    assert counted < 1.3 * made.stats.iterations  # measured: 1.09; 2.2 with the tables of a step forwards

@@ -21,6 +21,7 @@ NEED_NOT_APPLY = (
     testing.the_size_of_a_piece_is_a_count,
     testing.is_the_hbvm_that_it_names,
     testing.tangents_follow_and_change_nothing,
+    testing.batches_along_are_single_trajectories,
     testing.adjoints_are_what_tangents_say,
     testing.events_may_change_the_state,
     testing.pairs_hold_twice_the_digits,
