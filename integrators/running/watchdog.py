@@ -136,4 +136,5 @@ def stall_detector(stepper: Watched, t: float, end: float) -> StallDetector:
     return stepper.crawl
 
 
-Crawl, crawl = StallDetector, stall_detector  # their names in the kernel
+Crawl = StallDetector  # their names in the kernel
+crawl = stall_detector
