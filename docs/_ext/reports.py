@@ -17,6 +17,7 @@ WAYS = """<a class="brand" href="../../index.html">hbvm-bench</a>
 <a href="../../reports.html">All reports</a>
 <a href="../../howto/reading_a_report.html">How to read a report</a>
 </nav>"""
+OUT = re.compile(r'<nav class="ways" aria-label="All reports">.*?</nav>', re.DOTALL)  # of local pages
 LINK = re.compile(r'href="([\w./-]+)"')
 
 
@@ -45,7 +46,7 @@ def _copy(page: Path, folder: Path, done: set[Path]) -> None:
     """Put a report's page, with links to the site, into a folder, and the files beside it that it uses."""
     done.add(page)
     folder.mkdir(parents=True, exist_ok=True)
-    text = page.read_text(encoding="utf-8")
+    text = OUT.sub("", page.read_text(encoding="utf-8"), count=1)
     (folder / page.name).write_text(text.replace(BRAND, WAYS, 1), encoding="utf-8")
     for name in set(LINK.findall(text)):
         source = (page.parent / name).resolve()

@@ -43,7 +43,7 @@ def write_pages(directory: Path) -> Iterator[Path]:
     for folder in sorted(path for path in directory.iterdir() if path.is_dir()):
         if (folder / archive.NAME).is_file():
             path = folder / "index.html"
-            files = pages(document(archive.read(folder / archive.NAME)))
+            files = pages(document(archive.read(folder / archive.NAME)), folder)
             write_all({folder / name: text.encode() for name, text in files.items()})
             yield path
 

@@ -9,10 +9,10 @@ from hbvm_bench.report.markdown import markdown
 from hbvm_bench.store.files import write_all
 
 
-def rendered(document: Document) -> dict[str, bytes]:
-    """Return all files of a document by their path in its directory."""
+def rendered(document: Document, directory: Path | None = None) -> dict[str, bytes]:
+    """Return all files of a document by their path in its directory; pages link to what is around it."""
     files = {document.name: markdown(document).encode()}
-    files |= {name: text.encode() for name, text in pages(document).items()}
+    files |= {name: text.encode() for name, text in pages(document, directory).items()}
     return {picture.file: picture.svg.encode() for picture in document.shown} | files
 
 
@@ -33,6 +33,6 @@ def write(document: Document, directory: Path, beside: Mapping[str, bytes] | Non
     problems.errors.InputError
         If the directory cannot be written.
     """
-    files = {**(beside or {}), **rendered(document)}
+    files = {**(beside or {}), **rendered(document, directory)}
     write_all({directory / name: content for name, content in files.items()})
     return [directory / document.name, directory / "index.html"]

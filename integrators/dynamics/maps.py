@@ -144,7 +144,7 @@ def indicator_map(
         Seconds from one file to the next, at least.
     resume : path, optional
         Go on from the checkpoint in this file, of the same arguments. If there is no such file and
-        ``checkpoint`` is the same path, begin at the beginning. Only give a file that you made: it is a
+        ``checkpoint`` is the same path, start from the beginning. Only give a file that you made: it is a
         pickle.
 
     Returns

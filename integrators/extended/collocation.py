@@ -58,7 +58,7 @@ def integrate(problem: Problem, at: Array, *, decay: float = DECAY) -> Numbers:
             code, h = advance(t, end, h, y, par, *numbers, decay)
         except NumbaError:
             raise InputError(
-                f"the field of {problem!r} has a function or a table that is not to be had in double-double."
+                f"the field of {problem!r} has a function or a table that is not available in double-double."
             ) from None
         if code:
             raise InputError(f"{problem!r} could not be integrated beyond t = {t!r} in double-double.")

@@ -176,7 +176,7 @@ def _times_momentum(scale: Function, dof: int) -> Function:
 
 
 def _energy_gradient(field: Function, dof: int) -> Function:
-    """Return grad H from the field (dH/dp, -dH/dq), with the very same roundings."""
+    """Return grad H from the field (dH/dp, -dH/dq), with the same roundings."""
     velocity, slope = field.part(0, dof), -field.part(dof, 2 * dof)
     loops = joined([(dof, velocity.loops), (0, slope.loops)])
     return Function(field.graph, slope.outputs + velocity.outputs, loops)

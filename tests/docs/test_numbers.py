@@ -15,7 +15,7 @@ REPORTS = pages.ROOT / "reports"
 LINK = re.compile(r"\]\((?:\.\./)*reports/(\w[\w-]*)/")
 NUMBER = re.compile(r"(?<![\w.])\d\.\d+e-?\d+")  # a measured error; bounds are round numbers
 RATIO = re.compile(r"(?<![\w.])\d+\.\d+(?= times| µs| ms|×| of the time)")
-INSERTED = re.compile(r"\{\{ stored\(.*?\) \}\}")
+INSERTED = re.compile(r"\{\{ stored\(\".*?\) \}\}")
 
 
 def report(name: str) -> str:

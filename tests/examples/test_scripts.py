@@ -32,6 +32,7 @@ SAYS = {
     "mass_matrix.py": ["the same trajectory as SciPy's: True", "energy kept: True"],
     "measured_forcing.py": ["steps that end at a knot: 40 of 40"],
     "long_run.py": ["interrupted at t = ", "the same bits as without a break: True"],
+    "scaling.py": ["| threads | time (s) | speed-up | efficiency |", "\n| 1 | ", " | 1.00 | 100% |"],
     "section.py": ["3793 passages", "accurate: HBVM(), heyoka"],
     "solution.py": ["the same from a file: True True", "the same from another process: True"],
 }

@@ -114,11 +114,11 @@ def install(simulation: Any, method: HBVM | Gauss) -> None:
             f"{method!r} chooses k and s itself, REBOUND's plugin does not: give HBVM(k=8, s=8)."
         )
     if given := method.control():
-        raise InputError(f"{next(iter(given))}= is not to be had in REBOUND: leave it out.")
+        raise InputError(f"{next(iter(given))}= is not available in REBOUND: leave it out.")
     given_tol = method.tol is not None and (method.h is not None or method.tol != TOLERANCE)
     if method.solver not in ("auto", "fixed_point"):
         raise InputError(
-            f"solver={method.solver!r} is not to be had in REBOUND, where steps are solved by fixed-point "
+            f"solver={method.solver!r} is not available in REBOUND, where steps are solved by fixed-point "
             "iteration: leave it out."
         )
     simulation.integrator = NAME

@@ -240,5 +240,5 @@ def test_what_cannot_be_done_is_said() -> None:
 
 
 def test_an_absolute_tolerance_is_refused() -> None:
-    with pytest.raises(InputError, match="atol= is not to be had in REBOUND"):
+    with pytest.raises(InputError, match="atol= is not available in REBOUND"):
         install(rebound.Simulation(), HBVM(k=8, s=8, tol=1e-12, atol=1e-10))
