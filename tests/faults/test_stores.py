@@ -356,7 +356,7 @@ def test_a_full_disk_is_one_sentence_and_leaves_nothing_half_written(tmp_path, m
     "command", [["merge", "sound", "run", "--out", "both"], ["report", "run", "-o", "r"]]
 )
 def test_a_command_that_meets_a_full_disk_ends_with_the_sentence(here, monkeypatch, capsys, command):
-    monkeypatch.setattr("hbvm_bench.report.write.rendered", lambda content: {"report.md": b"text"})
+    monkeypatch.setattr("hbvm_bench.report.write.rendered", lambda content, *_: {"report.md": b"text"})
     filling_up(monkeypatch, 0)
     assert cli.main(command) == 2
     sentence(capsys.readouterr().err, "No space left on device")
