@@ -210,8 +210,8 @@ class Solutions(Trajectories):
     def errors(self) -> dict[str, Array]:
         """Return the deviation of each invariant from its initial value, shape (n, m), by name.
 
-        As `problems.Problem.errors`; NaN at times that a trajectory did not reach. After an event that changes
-        the state they are relative to the state after it, as in `Solution.errors`.
+        As `problems.Problem.errors`; NaN at times that a trajectory did not reach. After an event that
+        changes the state they are relative to the state after it, as in `Solution.errors`.
         """
         system, members = self.problem.system, zip(self._segments(), self._times, self.y, strict=True)
         return self._gathered([segments.errors(system, t, y) for segments, t, y in members])
