@@ -323,12 +323,13 @@ def taylor_integrator(problem: Problem, tolerance: str, precision: str = "real12
         _expressions(problem.system, hy, real),
         np.array([real(value) for value in problem.y0.tolist()]),
         time=real(float(problem.t0)),
-        pars=np.array([real(value) for value in problem.par.tolist()]),
         fp_type=real,
         tol=real(tolerance),
         high_accuracy=True,
         compact_mode=problem.system.dim > 40,
     )
+    used = len(integrator.pars)  # up to the last parameter that the formulas contain
+    integrator.pars[:] = np.array([real(value) for value in problem.par.tolist()[:used]])
     return integrator, real
 
 

@@ -117,7 +117,8 @@ class Variational:
 
         self._problem, self._dim = problem, problem.system.dim
         equations = hy.var_ode_sys(emit.heyoka(problem.system), hy.var_args.vars, order=1)
-        self._taylor = hy.taylor_adaptive(equations, problem.y0.tolist(), tol=TOLERANCE, pars=problem.par)
+        self._taylor = hy.taylor_adaptive(equations, problem.y0.tolist(), tol=TOLERANCE)
+        self._taylor.pars[:] = problem.par[: len(self._taylor.pars)]
         self._finished = hy.taylor_outcome.time_limit
 
     def run(self, rounds: int) -> Array:

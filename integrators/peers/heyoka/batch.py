@@ -36,7 +36,6 @@ class Lanes:
         self._ta = hy.taylor_adaptive_batch(
             emit.heyoka(system),
             np.zeros((system.dim, self.size)),
-            pars=np.tile(system.pack({})[:, None], (1, self.size)),
             **options,
         )
         self.compile_seconds = perf_counter() - started
@@ -72,14 +71,14 @@ class Lanes:
         Between heyoka's calls is only what cannot wait: a group of a small system takes 0.1 ms.
         """
         ta, size, n, y = self._ta, self.size, len(result.status), result.y
-        now, state = ta.time, ta.state  # heyoka's own memory
+        now, state, par = ta.time, ta.state, ta.pars  # heyoka's own memory
         ends = [(place, t, [t] * size) for place, t in enumerate(result.t.tolist())]
         ended: list[tuple[int, Any]] = []
         for first, begin in zip(range(0, n, size), states, strict=True):
             ta.set_time(t0)
             state[:] = begin
-            if values.size:
-                ta.pars[:] = values[first // size]
+            if len(par):
+                par[:] = values[first // size][: len(par)]
             for place, t, all_there in ends:
                 if t != t0:
                     ta.propagate_until(all_there, max_steps=CRAWL_STEPS)

@@ -142,12 +142,14 @@ class TaylorProgram(ProgramBase):
         self._spare: list[Any] = []
 
     def _integrator(self, **more: Any) -> Any:
-        """Return an integrator; heyoka compiles what it has not in a cache."""
+        """Return an integrator; heyoka compiles what it has not in a cache.
+
+        It has the parameters up to the last one that its formulas contain.
+        """
         from problems import emit
 
-        system, par = self.system, self.system.pack({}).tolist()
         return load("heyoka").taylor_adaptive(
-            emit.heyoka(system), [0.0] * system.dim, pars=par, **self._options, **more
+            emit.heyoka(self.system), [0.0] * self.system.dim, **self._options, **more
         )
 
     def with_events(
@@ -270,13 +272,13 @@ class TaylorStepper(RestorableStepper):
         self._stats.extra["side_steps"] = 0
         self._ta, self._sign, self._stepped = integrator, 1.0, False
         self._outcome = load("heyoka").taylor_outcome
-        if par.size:
-            integrator.pars[:] = par
+        self._par = par
+        integrator.pars[:] = par[: len(integrator.pars)]
         self._place(t, y)
 
     def look_for(self, events: Mapping[str, Event], integrator: Any, end: float) -> None:
         """Go on with an integrator that finds events, and keep them up to a time."""
-        integrator.pars[:] = self._ta.pars
+        integrator.pars[:] = self._par[: len(integrator.pars)]
         self._ta = integrator
         self._place(self._t, self._y)
         self.search = TaylorSearch(events, self._y, self._t, end, lambda: self._t)

@@ -5,9 +5,10 @@ import pytest
 
 import integrators.testing as testing
 import problems
-from integrators import Status, integrate
+from hbvm_bench.reference import solutions
+from integrators import Event, Status, integrate, integrate_many
 from integrators.peers.heyoka.taylor import COLD, EPS, Taylor
-from problems import Problem, VectorField
+from problems import Hamiltonian, Problem, VectorField
 from problems.errors import InputError
 
 
@@ -172,3 +173,21 @@ def test_a_start_at_rest_that_heyoka_cannot_leave_is_a_status():
     solution = integrate(Problem(system, y0=[0.0], t_end=10.0), Taylor(), [10.0])
     assert solution.status is Status.NOT_FINITE
     assert "from t = 0.0" in solution.reason
+
+
+def test_parameters_that_the_formulas_do_not_contain():
+    def energy(q, p, par):
+        return par.b * p[0] ** 2 / 2 + q[0] ** 2 / 2
+
+    def half(q, par):
+        return q[0] - par.c[1] / 14
+
+    system = Hamiltonian(energy, dof=1, parameters={"a": 3.0, "b": 1.0, "c": [5.0, 7.0]})
+    problem = Problem(system, q0=[1.0], p0=[0.0], t_end=2.0)
+    found = integrate(problem, Taylor(), [1.0, 2.0], events=Event(half))
+    assert np.abs(found.y[:, 0] - np.cos([1.0, 2.0])).max() < 1e-15  # measured 1e-16
+    assert abs(found.events["half"].t[0] - np.pi / 3) < 1e-14  # measured 0
+    many = integrate_many(problem, Taylor(), starts=[[1.0, 0.0]] * 5, times=[1.0, 2.0])
+    assert np.abs(many.y[:, :, 0] - np.cos([1.0, 2.0])).max() < 1e-15  # measured 1e-16
+    q = solutions.taylor(problem, np.array([0.0, 2.0]), "1e-28")[1][0]
+    assert abs(float(q) - np.cos(2.0)) < 1e-16  # measured 0
