@@ -467,7 +467,7 @@ class Actions(Protocol):
     """A program whose events may change the state and the parameters (``Event(then=...)``).
 
     A stepper that looks for such events has ``par``, the present parameters, shape (n_par,), and its
-    ``search`` passes those after each event to `integrators.events.finder.Hits`.
+    ``search`` passes those after each event to `integrators.events.finder.EventLog`.
 
     Attributes
     ----------
@@ -594,7 +594,7 @@ class Batches(Protocol):
 
 
 class BatchesAlong(Protocol):
-    """A program with a better way to integrate many starts with tangent vectors than one after another."""
+    """A program that integrates many trajectories with tangent vectors faster than one after another."""
 
     def goes_along(self, directions: tuple[Array, Array]) -> bool:
         """Whether it has for so many vectors; they are as for `batch_along`."""

@@ -250,6 +250,8 @@ def nbody(
             raise InputError(
                 f"bodies {same[0]} and {a} are at one place; move one of them, or give softening=."
             )
+    if not isinstance(forces, Sequence):
+        raise InputError(f"forces={shown(forces)} must be a list of forces, such as [PostNewtonian(c=...)].")
     fields = [force for force in forces if not isinstance(force, J2 | PostNewtonian)]
     for force in forces:
         if not callable(force) and force in fields:

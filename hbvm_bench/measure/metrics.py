@@ -190,7 +190,7 @@ def megno(m: Measured) -> float | str:
 
 @metric("largest Lyapunov exponent", "exponent", "1/time", better=None, scale="linear", same_trajectory=True)
 def exponent(m: Measured) -> float | str:
-    """Largest Lyapunov exponent over the span, from the derivatives of the method's steps."""
+    """Largest Lyapunov exponent over the integration interval, from the derivatives of the method's steps."""
     return _of_chaos(m, "exponent")
 
 

@@ -59,8 +59,8 @@ class Exponents:
     divergence : float or None
         That mean along the trajectory, computed without the vectors: exact where it is constant, else the
         integral of a further component by the quadrature of the same steps, taken once more, so that it is
-        the sum to the local error of the vectors. ``None`` where not all exponents are asked for, and for
-        systems so large that the Jacobian is not written down.
+        the sum to the local error of the vectors. ``None`` where not all exponents are asked for, for
+        systems so large that the Jacobian is not written down, and where the repeated steps fail.
     pairs : float or None
         The largest sum of two exponents that are each other's negative, for all exponents of a canonical
         system: with `Gauss` this is rounding.
@@ -69,7 +69,7 @@ class Exponents:
     rounds : int
         How many times the vectors were made orthonormal.
     steps : int
-        How many there were, those of repeated rounds among them.
+        Number of steps, repeated ones included.
     status, reason
         How the integration ended; after a failure, the averages are those up to there.
     """

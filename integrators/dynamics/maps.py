@@ -1,4 +1,4 @@
-"""Indicators of chaos, and Lyapunov exponents, over many starts or parameters."""
+"""Indicators of chaos, and Lyapunov exponents, over many initial conditions or parameters."""
 
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -38,13 +38,13 @@ class IndicatorMap:
     Attributes
     ----------
     values : ndarray, shape (n,)
-        The indicator at the end of each; NaN where it did not arrive there.
+        The indicator at the end of each; NaN if the integration failed.
     status : list of Status
         How each ended.
     reason : list of str
         A sentence on each failure, else empty.
     starts : ndarray, shape (n, dim)
-        Their starts.
+        Their initial conditions.
     par : ndarray, shape (n, n_par)
         Their parameters.
     warning : str
@@ -66,7 +66,7 @@ class ExponentMap:
     Attributes
     ----------
     exponents : ndarray, shape (n, count)
-        Of each, in 1/time, the largest first; NaN where it did not get to its end.
+        Of each, in 1/time, the largest first; NaN if the integration failed.
     intervals : ndarray, shape (n, count, 2)
         Each with 95 % confidence, or a bound of convergence, as in `Exponents`.
     sum, divergence, pairs : ndarray, shape (n,)
@@ -76,7 +76,7 @@ class ExponentMap:
     reason : list of str
         A sentence on each failure, else empty.
     starts : ndarray, shape (n, dim)
-        Their starts.
+        Their initial conditions.
     par : ndarray, shape (n, n_par)
         Their parameters.
     warning : str
@@ -112,7 +112,7 @@ def indicator_map(
     every_seconds: NotNegative = SECONDS,
     resume: File | None = None,
 ) -> IndicatorMap:
-    """Return an indicator of chaos for many starts, or values of parameters.
+    """Return an indicator of chaos for many initial conditions, or values of parameters.
 
     Every trajectory is integrated by itself, as many at once as there are threads. Compiled steps run in
     parallel; what Python does between them does not, so threads gain less where trajectories are short.
@@ -144,7 +144,7 @@ def indicator_map(
         Seconds from one file to the next, at least.
     resume : path, optional
         Go on from the checkpoint in this file, of the same arguments. If there is no such file and
-        ``checkpoint`` is the same path, start from the beginning. Only give a file that you made: it is a
+        ``checkpoint`` is the same path, start from the beginning. Only load files that you trust: it is a
         pickle.
 
     Returns
@@ -201,7 +201,7 @@ def lyapunov_map(
     every_seconds: NotNegative = SECONDS,
     resume: File | None = None,
 ) -> ExponentMap:
-    """Return Lyapunov exponents with intervals for many starts, or values of parameters.
+    """Return Lyapunov exponents with intervals for many initial conditions or parameters.
 
     Every trajectory is integrated by itself, as many at once as there are threads; a grid is a list of its
     points here.
@@ -293,7 +293,7 @@ class _Loop:
         Parameters
         ----------
         problem : Problem
-            With another start and other parameters for each.
+            With other initial conditions and parameters for each.
         rows, par : ndarray, shapes (n, dim), (n, n_par)
             These.
         value : callable

@@ -38,7 +38,7 @@ def batch_along(
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _WorkAlong(Work):
-    """A batch of the larger system; what leaves its lane goes as a trajectory with vectors that follow it."""
+    """A batch of the larger system; what leaves its lane is integrated by a stepper with tangent vectors."""
 
     larger: VectorLanes
     single: tuple[Array, Array]

@@ -1,5 +1,6 @@
 """A trajectory with fixed step size."""
 
+import math
 from time import perf_counter
 
 import numpy as np
@@ -137,4 +138,5 @@ class FixedStepper(HBVMStepper):
         ctx = self._context
         ctx.t0, ctx.n = t0, 0
         self._set_step(-ctx.h)
+        ctx.events.acted = -math.copysign(math.inf, ctx.h)  # the same event may happen on the way back
         self._forget()

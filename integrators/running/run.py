@@ -315,7 +315,27 @@ class _Whole(np.ndarray):
         raise InputError(f"its parts are read-only; set the whole: {self.setting}.")
 
     def __array_finalize__(self, obj: Any) -> None:
-        self.setting = ""  # what is calculated from it is an array like others
+        self.setting = ""  # a view or a copy is an array like others
+
+    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **options: Any) -> Any:
+        plain = (np.asarray(x) if isinstance(x, _Whole) else x for x in inputs)
+        return getattr(ufunc, method)(*plain, **options)
+
+    # run.y *= 0.99 sets the whole
+    def __iadd__(self, other: Any) -> Any:
+        return np.asarray(self) + other
+
+    def __isub__(self, other: Any) -> Any:
+        return np.asarray(self) - other
+
+    def __imul__(self, other: Any) -> Any:
+        return np.asarray(self) * other
+
+    def __itruediv__(self, other: Any) -> Any:
+        return np.asarray(self) / other
+
+    def __repr__(self) -> str:
+        return repr(np.asarray(self))
 
     def __getitem__(self, key: Any) -> Any:
         if isinstance(key, str) and self.setting:

@@ -93,8 +93,6 @@ class StallDetector:
             return ""
         return f"{count} steps from t = {mark!r} only came to t = {t!r}: the steps have collapsed."
 
-    sees = update  # its name in the kernel
-
     def _blows_up(self, t: float, size: float) -> str:
         way, share = t - self._looked, abs(t - self._looked) / abs(self._way) if self._way else math.inf
         grows = STEADY * self._share <= share <= NEARER and size >= LARGER * self._size
@@ -116,7 +114,7 @@ class Watched(Destination, Protocol):
 
     Attributes
     ----------
-    crawl : StallDetector or None
+    detector : StallDetector or None
         Its detector, if it has a destination; kept here from piece to piece.
     """
 

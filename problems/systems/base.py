@@ -136,7 +136,7 @@ class System:
             "guards": list(self.guards),
             "vectors": sorted(self._vectors),
             "bodies": bodies,
-            "graph": packed(self._graph),
+            "graph": packed(self._graph, self.n_par),
             "functions": {name: function.plain() for name, function in self._written.items()},
         }
 

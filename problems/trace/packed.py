@@ -13,16 +13,19 @@ from problems.trace.graph import Affine, Graph, Loop, Table
 _SPACES = ("t", "y", "par")
 
 
-def packed(graph: Graph) -> dict[str, Any]:
+def packed(graph: Graph, n_par: int) -> dict[str, Any]:
     """Return a graph as lists.
 
-    Operations on symbols that stand for something else while functions are derived or emitted are
-    left out, as ``None``: no function depends on them, and they are made again when they are needed.
+    Operations on symbols that stand for something else while functions are derived or emitted, and on
+    parameters beyond the ``n_par`` of the system (`problems.emit.time_scale`), are left out, as ``None``: no
+    function of the system depends on them, and they are made again when they are needed.
     """
     passing: set[int] = set()
     nodes: list[list[Any] | None] = []
     for node in graph.nodes:
-        stand_in = node.op == "symbol" and node.data[0] not in _SPACES
+        space, place = node.data if node.op == "symbol" else ("", None)
+        beyond = space == "par" and isinstance(place, int) and place >= n_par
+        stand_in = node.op == "symbol" and (space not in _SPACES or beyond)
         if stand_in or any(arg.id in passing for arg in node.args):
             passing.add(node.id)
             nodes.append(None)

@@ -207,3 +207,8 @@ def test_the_examples_of_the_page_are_true():
 def test_poles_that_are_none():
     with pytest.raises(InputError, match="three numbers, not all 0"):
         J2(J2=1.0, R=1.0, pole=[0.0, 0.0, 0.0])
+
+
+def test_a_single_force_is_refused_with_the_list_that_is_meant():
+    with pytest.raises(InputError, match=r"must be a list of forces, such as \[PostNewtonian"):
+        nbody(MASSES, X, V, forces=PostNewtonian(c=1.0), t_end=1.0)

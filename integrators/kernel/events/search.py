@@ -166,7 +166,10 @@ class KernelSearch:
         known = f"are known up to t = {memory.known!r} only."
         if halted == RAISED:
             error = self._error
-            self.trouble = Status.USER_ERROR, f"{UserError(error)}: events {known}", error
+            known = f"events {known}"
+            if memory.raised < 0:
+                known = f"then of the event {self._hits.names[-1 - memory.raised]!r} at t = {memory.time!r}."
+            self.trouble = Status.USER_ERROR, f"{UserError(error)}: {known}", error
             return
         if halted == UNDEFINED:
             name, t = self._hits.names[memory.event], memory.time

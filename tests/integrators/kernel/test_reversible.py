@@ -1,10 +1,12 @@
 """Gauss with reversible adaptive steps: the energy does not drift, and the way back leads to the start."""
 
+import pickle
+
 import numpy as np
 import pytest
 
 import problems
-from integrators import Gauss, Status, order_of
+from integrators import Gauss, Status, integrate, load, order_of
 from problems import InputError, emit
 
 TWO_PI = 2.0 * np.pi
@@ -114,3 +116,13 @@ def test_systems_without_it_are_refused(name):
     refusal = Gauss(s=4, tol=1e-9, steps="reversible").accepts(problem)
     assert refusal is None or "reversible" in refusal
     assert (refusal is None) == (problem.system.dof is not None)
+
+
+def test_a_solution_can_be_saved_and_its_problem_sent_to_a_worker(tmp_path):
+    problem = problems.load("kepler", e=0.5)
+    solution = integrate(problem, Gauss(s=4, tol=1e-10, steps="reversible"), times=[1.0, 2.0])
+    solution.save(tmp_path / "kepler.npz")
+    loaded = load(tmp_path / "kepler.npz")
+    assert np.array_equal(loaded.y, solution.y)
+    again = integrate(pickle.loads(pickle.dumps(problem)), solution.method, times=[1.0, 2.0])
+    assert np.array_equal(again.y, solution.y)

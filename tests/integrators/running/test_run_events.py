@@ -99,3 +99,25 @@ def test_a_terminal_event_before_all_samples_leaves_its_state(method: MethodBase
     assert many[0].t == pytest.approx(floor.t, abs=1e-14)  # measured 0
     assert many[1].t.tolist() == many.events[1]["floor"].t.tolist()
     assert many[1].y.tolist() == many.events[1]["floor"].y.tolist()
+
+
+def test_the_same_event_may_happen_on_the_way_back():
+    oscillator = problems.VectorField(lambda y: [y[1], -y[0]], dim=2)
+    problem = problems.Problem(oscillator, y0=[1.0, 0.0], t_end=10.0)
+    double = Event(lambda t: t - 2.3, then=lambda y: [2 * y[0], 2 * y[1]], name="double")
+    run = start(problem, HBVM(k=8, s=4, h=0.05), events=double)
+    run.until(5.0)
+    run.until(1.0)
+    assert (run.status, run.t) == (Status.RUNNING, 1.0)
+    assert abs(np.hypot(*run.y) - 4.0) < 1e-12  # twice doubled; measured 2e-15
+
+
+def test_the_state_is_set_as_a_whole_by_an_operation_in_place():
+    run = start(problems.load("kepler"), HBVM())
+    before = run.y.copy()
+    run.y *= 2.0
+    assert np.array_equal(run.y, 2.0 * before)
+    assert type(run.y * 2.0) is np.ndarray
+    assert repr(run.y) == repr(np.asarray(run.y))
+    with pytest.raises(problems.InputError, match="set the whole"):
+        run.y[2:] *= 0.5
