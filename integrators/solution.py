@@ -423,7 +423,11 @@ class Solution:
 
     def guards(self) -> dict[str, Array]:
         """Return the quantities that are exactly zero by a symmetry, by name."""
-        return self.problem.guards(self.y, self.t)
+        if not self._acted:
+            return self.problem.guards(self.y, self.t)
+        segments = self._segments
+        par = segments.par[segments.places(self.t, self.y)].T
+        return invariants.guards(self.problem.system, par, self.y, self.t)
 
     def __repr__(self) -> str:
         return printable(

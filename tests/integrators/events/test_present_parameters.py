@@ -45,3 +45,10 @@ def test_reductions_have_the_parameters_of_each_time(own: bool, sign: float) -> 
         assert found.reduced["mean"][i] == pytest.approx(np.mean(k * 2.0**passed), rel=1e-14)  # measured 0
         energy = alone.invariants()["energy"].max()
         assert found.reduced["most"][i] == pytest.approx(energy, rel=1e-14)  # measured 2e-16
+
+
+def test_guards_have_the_parameters_of_each_time() -> None:
+    found = integrate(spring(), HBVM(), GRID, events=doubled())
+    passed = (found.events["passing"].t < found.t[:, np.newaxis]).sum(axis=1)
+    assert np.array_equal(found.guards()["stiffness"], 2.0**passed - 1.0)
+    assert passed[-1] > 2
