@@ -52,3 +52,33 @@ def test_guards_have_the_parameters_of_each_time() -> None:
     passed = (found.events["passing"].t < found.t[:, np.newaxis]).sum(axis=1)
     assert np.array_equal(found.guards()["stiffness"], 2.0**passed - 1.0)
     assert passed[-1] > 2
+
+
+def _two(tmp_path: Any) -> tuple[Any, Any]:
+    """Return an ensemble with two actions at each time, and what its file contains."""
+    heavier = Event(lambda q: 2.0 * q[0], then=lambda q, p, par: ([q[0], p[0]], {"k": par.k + 1.0}), name="a")
+    many = integrate_many(
+        spring(), HBVM(), parameters={"k": [1.0, 1.5]}, times=GRID[1:], events=[doubled("z"), heavier]
+    )
+    many.save(tmp_path / "many.npz")
+    return many, integrators.load(tmp_path / "many.npz")
+
+
+def test_events_keep_their_order_in_a_file_of_an_ensemble(tmp_path: Any) -> None:
+    many, loaded = _two(tmp_path)
+    assert [*loaded.events[0]] == ["z", "a"]
+    assert np.array_equal(many.events[0]["z"].t, many.events[0]["a"].t)
+    for i in range(2):
+        assert np.array_equal(loaded[i].invariants()["energy"], many[i].invariants()["energy"])
+
+
+def test_an_ensemble_whose_file_knows_no_parameters_is_saved_again(tmp_path: Any) -> None:
+    _two(tmp_path)
+    with np.load(tmp_path / "many.npz") as file:
+        arrays = {name: values for name, values in file.items() if not name.startswith("event_par:")}
+    np.savez(tmp_path / "earlier.npz", **arrays)
+    earlier: Any = integrators.load(tmp_path / "earlier.npz")
+    earlier.save(tmp_path / "again.npz")
+    again: Any = integrators.load(tmp_path / "again.npz")
+    assert again.events[1]["z"].par is None
+    assert np.array_equal(again.events[1]["z"].after, earlier.events[1]["z"].after)
