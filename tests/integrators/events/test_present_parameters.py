@@ -7,8 +7,10 @@ import pytest
 
 import integrators
 from integrators import HBVM, Event
+from integrators.events.finder import EventLog
 from integrators.reduce import Maximum, Mean
 from problems import Hamiltonian, Problem
+from problems.errors import InputError
 
 integrate: Any = integrators.integrate
 integrate_many: Any = integrators.integrate_many
@@ -82,3 +84,19 @@ def test_an_ensemble_whose_file_knows_no_parameters_is_saved_again(tmp_path: Any
     again: Any = integrators.load(tmp_path / "again.npz")
     assert again.events[1]["z"].par is None
     assert np.array_equal(again.events[1]["z"].after, earlier.events[1]["z"].after)
+
+
+def test_an_earlier_search_goes_on_unless_there_are_actions() -> None:
+    events = {"zero": Event(lambda q: q[0])}
+    log = EventLog(events, 1.0, 2, 1)
+    state, none = np.array([[0.0, -1.0]]), np.zeros(1, dtype=np.int64)
+    log.take(np.array([1.5]), state, state, none, none - 1)
+    kept = log.save()
+    kept["pieces"] = kept["pieces"][:5]
+    again = EventLog(events, 1.0, 2, 1)
+    again.load(kept)
+    again.take(np.array([4.7]), -state, -state, none, none + 1)
+    assert again.occurrences()["zero"].t.tolist() == [1.5, 4.7]
+    acting = EventLog({"zero": doubled()}, 1.0, 2, 1)
+    with pytest.raises(InputError, match="of another version"):
+        acting.load(kept)
