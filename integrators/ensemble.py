@@ -330,13 +330,14 @@ class Solutions(Trajectories):
             For a method that is not registered, or a file that cannot be written.
         """
         arrays: dict[str, NDArray[Any]] = {name: getattr(self, name) for name in _ARRAYS}
-        names = sorted({name for events in self.events for name in events})
+        names = list(dict.fromkeys(name for events in self.events for name in events))
         for name in names:
             occurrences = [events.get(name) for events in self.events]
             lengths = np.array([0 if hits is None else len(hits) for hits in occurrences], dtype=np.int64)
             arrays[f"event_counts:{name}"] = lengths
-            acts = any(hits is not None and hits.after is not None for hits in occurrences)
-            for key in ("t", "y", "direction", *(["after", "par"] if acts else [])):
+            known = next(hits for hits in occurrences if hits is not None)
+            more = [key for key in ("after", "par") if getattr(known, key) is not None]
+            for key in ("t", "y", "direction", *more):
                 parts = [getattr(hits, key) for hits in occurrences if hits is not None]
                 arrays[f"event_{key}:{name}"] = np.concatenate(parts)
         if self.variations is not None and self.directions is not None:

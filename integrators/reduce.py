@@ -241,10 +241,15 @@ class Reducer:
         self.numbers: list[NDArray[np.int64]] = []
 
     def take(self, numbers: NDArray[np.int64], t: Array, y: Array, par: Array) -> None:
-        """Take the states of trajectories of these numbers, shape (n, m, dim), at times (m,) or (n, m)."""
+        """Take the states of trajectories of these numbers, shape (n, m, dim), at times (m,) or (n, m).
+
+        Parameters have shape (n, n_par), or (n, m, n_par) where events have changed them.
+        """
         n, m, dim = y.shape
         self.numbers.append(numbers)
-        columns, own = y.reshape(n * m, dim).T, np.repeat(par, m, axis=0).T
+        each = par if par.ndim == 3 else par[:, np.newaxis]
+        columns = y.reshape(n * m, dim).T
+        own = np.broadcast_to(each, (n, m, par.shape[-1])).reshape(n * m, -1).T
         times = np.broadcast_to(t, (n, m)).reshape(-1)
         for name, evaluate in self._evaluate.items():
             with np.errstate(all="ignore"):

@@ -229,8 +229,11 @@ class Solution:
             first = self.start[np.newaxis, :, 1][: int(before)]
             states = np.concatenate([states, np.concatenate([first, self.low])], axis=1)
         end = float(at[-1])
-        at, states = self._with_actions(at, states)
         segments = self._segments
+        if segments.t.size > 1:  # states that events have made, in between; at one time the sample counts
+            at, states = np.append(at, segments.t[1:]), np.concatenate([states, segments.y[1:]])
+            _, order = np.unique(segments.sign * at, return_index=True)
+            at, states = at[order], states[order]
         segment = segments.places(at, states[:, :dim])
         if not self.status.failed and (self.t_stop - end) * (end - self.problem.t0) >= 0.0:
             end = self.t_stop  # a terminal event, after the last sample
@@ -295,22 +298,6 @@ class Solution:
             return program.start(row[:dim], par, t)
         pairs = np.stack([row[:dim], row[dim:]], axis=1)
         return cast("DoubleDouble", program).start_pairs(pairs, par, t)
-
-    def _with_actions(self, at: Array, states: Array) -> tuple[Array, Array]:
-        """Return samples, and the states that events' actions have made in between, in order."""
-        acted = [
-            happened for happened in self.events.values() if happened.after is not None and happened.t.size
-        ]
-        if not acted:
-            return at, states
-        sign = 1.0 if self.t_stop >= self.problem.t0 else -1.0
-        # At one time the sample counts, or else the state that the last of the events has made.
-        t = np.concatenate([at, *(happened.t for happened in acted[::-1])])
-        y = np.concatenate(
-            [states, *(happened.after for happened in acted[::-1] if happened.after is not None)]
-        )
-        _, places = np.unique(sign * t, return_index=True)
-        return t[places], y[places]
 
     @property
     def _acted(self) -> bool:
@@ -423,7 +410,11 @@ class Solution:
 
     def guards(self) -> dict[str, Array]:
         """Return the quantities that are exactly zero by a symmetry, by name."""
-        return self.problem.guards(self.y, self.t)
+        if not self._acted:
+            return self.problem.guards(self.y, self.t)
+        segments = self._segments
+        par = segments.par[segments.places(self.t, self.y)].T
+        return invariants.guards(self.problem.system, par, self.y, self.t)
 
     def __repr__(self) -> str:
         return printable(

@@ -116,14 +116,18 @@ class EventLog:
         Raises
         ------
         problems.errors.InputError
-            If an earlier version returned it.
+            If an earlier version returned it, which knew nothing of parameters that actions change, and
+            there are actions.
         """
-        if len(kept["pieces"]) != PARTS:
+        pieces = kept["pieces"]
+        if len(pieces) == PARTS - 1 and not any(self._acts):
+            pieces = (*pieces, np.empty((len(pieces[0]), self._widths[1])))
+        if len(pieces) != PARTS:
             raise InputError(
                 "this checkpoint is of another version of hbvm-bench, which knows less of events; restore it "
                 "with that version, or begin anew."
             )
-        self._pieces, self.counts = [kept["pieces"]], list(kept["counts"])
+        self._pieces, self.counts = [pieces], list(kept["counts"])
         self.terminal, self.stop = kept["terminal"], kept["stop"]
 
 

@@ -34,6 +34,7 @@ from integrators.protocol import (
 )
 from integrators.reduce import Reducer
 from integrators.running.integrate import prepared
+from integrators.segments import Segments
 from integrators.solution import Occurrences
 from problems.errors import InputError, shown
 from problems.problem import Problem
@@ -301,7 +302,7 @@ class Gathered:
             return
         chosen = numbers.tolist()
         if self._reducer is not None:
-            self._reduce(self._reducer, numbers, result.t, result.y)
+            self._reduce(self._reducer, numbers, result.t, result.y, events or [])
         elif self._rows is not None:
             for i, t, y in zip(chosen, np.broadcast_to(result.t, result.y.shape[:2]), result.y, strict=True):
                 there = ~np.isnan(t)
@@ -316,17 +317,34 @@ class Gathered:
         self._extra.update({chosen[i]: extra for i, extra in result.extra.items() if extra})
         self._events.update(zip(chosen, events or (), strict=False))
 
-    def _reduce(self, reducer: Reducer, numbers: Numbers, t: Array, y: Array) -> None:
+    def _reduce(
+        self, reducer: Reducer, numbers: Numbers, t: Array, y: Array, events: list[dict[str, Occurrences]]
+    ) -> None:
         """Take the states of some trajectories, and keep the last one of each."""
         t = np.broadcast_to(t, y.shape[:2])
         missing = self._times.shape[-1] - t.shape[1] if self._times.ndim == 2 else 0
         if missing > 0:  # each of these has fewer times than others
             t = np.pad(t, ((0, 0), (0, missing)), constant_values=np.nan)
             y = np.pad(y, ((0, 0), (0, missing), (0, 0)), constant_values=np.nan)
-        reducer.take(numbers, t, y, self._par[numbers])
+        reducer.take(numbers, t, y, self._parameters(numbers, t, y, events))
         some = np.flatnonzero(np.isfinite(t).any(axis=1))
         last = np.isfinite(t[some]).sum(axis=1) - 1
         self._y[numbers[some], 0], self._last[numbers[some]] = y[some, last], t[some, last]
+
+    def _parameters(
+        self, numbers: Numbers, t: Array, y: Array, events: list[dict[str, Occurrences]]
+    ) -> Array:
+        """Return the parameters of some trajectories, or of each of their samples if events change them."""
+        if not any(hits.par is not None for happened in events for hits in happened.values()):
+            return self._par[numbers]
+        par = np.repeat(self._par[numbers][:, np.newaxis], t.shape[1], axis=1)
+        t0 = self._problem.t0
+        for i, (j, happened) in enumerate(zip(numbers.tolist(), events, strict=True)):
+            there = np.isfinite(t[i])
+            sign = 1.0 if (t[i, there] >= t0).all() else -1.0
+            segments = Segments.from_events(t0, self._starts[j], self._par[j], happened, sign)
+            par[i, there] = segments.par[segments.places(t[i, there], y[i, there])]
+        return par
 
     _kept = ("_rows", "_y", "_variations", "_status", "_reason", "_stop", "_steps", "_extra", "_events")
 

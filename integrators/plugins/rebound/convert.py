@@ -127,7 +127,11 @@ def to_rebound(
             raise InputError(
                 f"the solution has no state: it ended at t = {problem.t_stop!r}, {problem.reason}"
             )
-        problem, y, t = problem.problem, problem.y[-1], float(problem.t[-1])
+        solution, segments = problem, problem._segments
+        y, t = solution.y[-1], float(solution.t[-1])
+        par = segments.par[segments.places(solution.t[-1:], solution.y[-1:])[0]]
+        changed: Any = solution.problem.system.unpack(par)  # by events
+        problem = solution.problem.replace(parameters=changed)
     check_is_problem(problem)
 
     system = problem.system

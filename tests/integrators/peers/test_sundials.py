@@ -1,10 +1,12 @@
 """CVODE: its library alone, stiff systems, sparse Jacobians."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 import problems
-from integrators import CVODE, HBVM, integrate
+from integrators import CVODE, HBVM, Status, integrate, start
 from integrators.peers.sundials import CVODEProgram
 
 STIFF = problems.load("stiff_chain", omega=50.0, t_end=10.0)
@@ -42,3 +44,26 @@ def test_a_large_system_has_its_jacobian_as_a_sparse_matrix():
     assert np.abs(found.y[-1] - truth.y[-1]).max() < 1e-6  # measured 1.2e-7
     # Newton's iteration converges: few evaluations a step, none for differences.
     assert found.stats.evaluations < 3 * found.stats.steps  # measured 1.2
+
+
+def test_steps_that_do_not_change_the_time_do_not_change_the_state():
+    cvode = pytest.importorskip("sksundae.cvode")
+    # y' = y^2: CVODE's solution grows beyond 1e14 before 1, as errors of 1e-8 move its pole by 8e-7.
+    field = problems.VectorField(lambda y: [y[0] ** 2], dim=1)
+    run: Any = start(problems.Problem(field, y0=[1.0], t_end=2.0), CVODE(rtol=1e-8, atol=1e-8))
+    run.until(2.0)
+    assert run.status is Status.STEP_UNDERFLOW
+
+    def square(t, y, slope):
+        slope[:] = y * y
+
+    alone = cvode.CVODE(square, rtol=1e-8, atol=1e-8)
+    alone.init_step(0.0, np.array([1.0]))
+    t, y = [0.0], [1.0]
+    while len(t) < 2 or t[-1] > t[-2]:
+        result = alone.step(t[-1] + 1.0, "onestep")
+        t.append(float(result.t))
+        y.append(float(result.y[0]))
+    assert run.t == pytest.approx(t[-2], rel=1e-12)  # measured 2e-15
+    assert run.y[0] == pytest.approx(y[-2], rel=1e-6)  # measured 5e-11
+    assert y[-1] > 1.01 * y[-2]  # the step that did not change t; measured 1.02

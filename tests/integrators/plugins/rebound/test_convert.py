@@ -1,10 +1,12 @@
 """From a simulation of REBOUND to a problem, and back."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 import problems
-from integrators import HBVM, from_rebound, integrate, to_rebound
+from integrators import HBVM, Event, from_rebound, integrate, to_rebound
 from problems import InputError
 
 rebound = pytest.importorskip("rebound")
@@ -48,6 +50,19 @@ def test_there_and_back_again(massless):
         assert one.m == other.m
         assert one.xyz == other.xyz
         assert one.vxyz == pytest.approx(other.vxyz, rel=4e-16)  # v = p/m
+
+
+def test_a_solution_whose_masses_an_event_has_changed():
+    problem = from_rebound(_planets(massless=0), t_end=20.0)
+    lighter = Event(
+        lambda t: t - 9.0, then=lambda y, par: ([*y], {"m": [0.5 * m for m in par.m]}), name="lighter"
+    )
+    found: Any = integrate(problem, HBVM(), [20.0], events=lighter)
+    masses: Any = problem.system.unpack(problem.par)["m"]
+    end = to_rebound(found)
+    assert len(found.events["lighter"]) == 1
+    assert [p.m for p in end.particles] == [0.5 * m for m in masses]
+    assert end.particles[1].vxyz == pytest.approx(found.v[-1, 3:6], rel=4e-16)  # v = p/m
 
 
 def test_forces_that_are_added():
