@@ -93,7 +93,8 @@ def expression(
 ) -> Problem:
     """Return a problem whose Hamiltonian is given as text.
 
-    Such as ``expression(H="(p1^2 + p2^2)/2 + q1^2*q2^2", q0=[0.5, 1.0], p0=[0.0, 0.3])``.
+    Tests a Hamiltonian of your own, such as
+    ``expression(H="(p1^2 + p2^2)/2 + q1^2*q2^2", q0=[0.5, 1.0], p0=[0.0, 0.3])``.
 
     Parameters
     ----------
