@@ -133,8 +133,8 @@ def finds_events_beside_its_steps(method: MethodBase, problem: Problem) -> str |
     if not offers(program, Events):
         return "it finds no events"
     grid = irregular(problem)
-    plain = integrate(problem, method, grid).y[:, 0]
-    level = float(plain.min() + plain.max()) / 2.0
+    plain = integrate(problem, method, grid)
+    level = float(plain.y[:, 0].min() + plain.y[:, 0].max()) / 2.0
 
     def crossing(y: Any, t: Any) -> Any:
         return y[0] - level - 1e-3 * (t - problem.t0)
@@ -179,7 +179,8 @@ def events_may_change_the_state(method: MethodBase, problem: Problem) -> str | N
     anew = integrate(problem.replace(y0=crossings.after[-1], t0=last), method, grid[later])
     change = float(np.max(np.abs(solution.y[later] - anew.y)))
     require(
-        change < ACTION_BOUND, f"after an action the method begins anew at its state, but is off by {change:.1e}"
+        change < ACTION_BOUND,
+        f"after an action the method begins anew at its state, but is off by {change:.1e}",
     )
     return None
 
