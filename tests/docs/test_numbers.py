@@ -119,3 +119,12 @@ def test_no_other_ratio_of_the_first_page_is_without_a_report():
     prose = " ".join(text for text in re.split(r"(?<=[.:]) ", README) if "|" not in text)
     ratios = re.findall(r"(?<![\w.])\d+\.\d+ times|by a factor of about \d+(?:\.\d+)?", prose)
     assert {one for one in ratios if not any(one in words for words, _ in README_RATIOS)} == set()
+
+
+def test_ratios_of_the_page_of_headline_ratios_stand_in_the_reports():
+    text = (pages.ROOT / "docs" / "developers" / "remeasured.md").read_text(encoding="utf-8")
+    sections = [part for part in text.split("\n## ") if LINK.search(part)]
+    assert len(sections) >= 8
+    for part in sections:
+        (name,) = set(LINK.findall(part))
+        assert [ratio for ratio in re.findall(r"\d+\.\d+×", part) if ratio not in report(name)] == [], name
