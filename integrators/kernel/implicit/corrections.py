@@ -24,7 +24,6 @@ from integrators.kernel.implicit.constants import BLENDED
 from integrators.kernel.implicit.jacobian import factorize, linearize, resolve
 from integrators.kernel.implicit.linear import eliminate
 from integrators.kernel.implicit.stages import at, project, set_velocities
-from integrators.kernel.native.attributes import address
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.memory import get, put, splat8
 from integrators.kernel.step.stages import offset
@@ -81,7 +80,7 @@ def take_stage(ctx, m, stage):
     """Set `Workspace.state` to one of the stages."""
     lanes = ctx.lanes
     start = ctx.stages + ((stage // lanes) * ctx.padded + m.first) * lanes
-    for d in range(m.state.size):
+    for d in range(m.unknowns):
         m.state[d] = start[lanes * d + stage % lanes]
 
 
@@ -89,11 +88,11 @@ def take_stage(ctx, m, stage):
 def take_mean(ctx, m):
     """Set `Workspace.state` to the mean of the stages."""
     lanes = ctx.lanes
-    for d in range(m.state.size):
+    for d in range(m.unknowns):
         m.state[d] = 0.0
     for chunk in range(ctx.chunks):
         start = ctx.stages + offset(ctx, chunk) + lanes * m.first
-        for d in range(m.state.size):
+        for d in range(m.unknowns):
             for l in range(8):
                 m.state[d] += m.weights[8 * chunk + l] * start[lanes * d + l]
 
@@ -104,7 +103,7 @@ def full(ctx, m, above):
 
     One real matrix of s R rows; in the second-order form q' is eliminated. Its rows begin at ``above``.
     """
-    s, rows = m.s, m.state.size
+    s, rows = m.s, m.unknowns
     second = ctx.second
     n = s * rows
     width = 8 * ((n + 7) // 8)
@@ -120,18 +119,18 @@ def full(ctx, m, above):
     for stage in range(ctx.k):
         take_stage(ctx, m, stage)
         linearize(ctx, m, ctx.times[stage])
-        for e in range(m.entries.size):
+        for e in range(m.entry_count):
             r, c = m.entry_rows[e], m.entry_columns[e]
             slope = m.entries[e] * m.factor[c]
             known = 0.0
             if second:
                 for i in range(s):
-                    known += m.integrals[stage, i] * m.residual[at(m, i, above + c)]
+                    known += m.integrals[s * stage + i] * m.residual[at(m, i, above + c)]
             for j in range(s):
-                part, row = m.moments[j, stage] * slope, width * (j * rows + r) + c
+                part, row = m.moments[m.k * j + stage] * slope, width * (j * rows + r) + c
                 for i in range(s):
-                    whole[row + i * rows] -= part * m.reach[stage, i]
-                x[j * rows + r] += m.moments[j, stage] * (ctx.h * m.entries[e] * known)
+                    whole[row + i * rows] -= part * m.reach[s * stage + i]
+                x[j * rows + r] += m.moments[m.k * j + stage] * (ctx.h * m.entries[e] * known)
     m.factorizations += 1
     if not eliminate(whole, n, width, x):
         return False
@@ -143,7 +142,7 @@ def full(ctx, m, above):
             for d in range(rows):
                 total = 0.0
                 for j in range(s):
-                    total += m.x[i, j] * x[j * rows + d]
+                    total += m.x[s * i + j] * x[j * rows + d]
                 place = at(m, i, above + d)
                 m.correction[place] = m.residual[place] + ctx.factors.row[above + d] * total
     return True
@@ -178,7 +177,7 @@ def correct(ctx, m, which):
         return NOT_FINITE
     possible = True
     if which == EACH and m.whole > 0:
-        for above in range(0, ctx.rows, m.state.size):
+        for above in range(0, ctx.rows, m.unknowns):
             possible = possible and full(ctx, m, above)
     else:
         if which != KEPT:
@@ -193,7 +192,7 @@ def correct(ctx, m, which):
             else:
                 newton(ctx, m)
     if not possible:
-        return DIVERGED if is_finite(address(m.entries), m.entries.size) else NOT_FINITE
+        return DIVERGED if is_finite(m.entries, m.entry_count) else NOT_FINITE
     for i in range(0, m.parts * m.block, 8):
         put(m.gamma, i, get(m.gamma, i) + get(m.correction, i))
     ctx.stages, ctx.scratch.old_stages = ctx.scratch.old_stages, ctx.stages

@@ -3,7 +3,7 @@
 from integrators.kernel.implicit.factors import FACTORIZE, SOLVE
 from integrators.kernel.implicit.linear import factor, solve
 from integrators.kernel.implicit.workspace import Workspace
-from integrators.kernel.native.attributes import address, view
+from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.lanes import fma
 from integrators.kernel.simd.memory import call_factors, call_field, get, put, splat8, spread
@@ -60,13 +60,13 @@ def linearize(ctx, m, t):
     """
     if m.source == 0 and m.trajectory != 0:
         entries = workspace(m.trajectory).entries
-        for i in range(m.entries.size):
+        for i in range(m.entry_count):
             m.entries[i] = entries[i]
     elif m.source == 0:
         differences(ctx, m, t)
     else:
         m.trial[0] = t
-        call_field(m.source, m.trial, address(m.state), ctx.par, address(m.entries))
+        call_field(m.source, m.trial, m.state, ctx.par, m.entries)
     m.jacobians += 1
     m.factored = 0
     m.linearized = 1
@@ -76,7 +76,7 @@ def linearize(ctx, m, t):
 @compiled
 def contraction(m):
     """Estimate the factor of one fixed-point iteration, but for X_s, from powers of the Jacobian."""
-    rows = m.state.size
+    rows = m.unknowns
     for d in range(rows):
         m.slopes[d] = 1.0 + 0.0625 * ((7 * d) % 13)
     growth = 1.0
@@ -84,7 +84,7 @@ def contraction(m):
         norm = 0.0
         for d in range(rows):
             m.next_slopes[d] = 0.0
-        for i in range(m.entries.size):
+        for i in range(m.entry_count):
             c = m.entry_columns[i]
             m.next_slopes[m.entry_rows[i]] += m.entries[i] * (m.factor[c] * m.slopes[c])
         for d in range(rows):
@@ -105,7 +105,7 @@ def factorize(ctx, m):
     In the second-order form, I - z_i^2 h^2 J diag(q'/p). Where a function keeps
     the factors, it is done there.
     """
-    rows = m.state.size
+    rows = m.unknowns
     m.factored = 0
     m.factorizations += 1
     if m.factors:
@@ -119,14 +119,14 @@ def factorize(ctx, m):
             z, w = get(m.powers, 16 * group), get(m.powers, 16 * group + 8)
             for r in range(rows):
                 begins[r] = ends[r] = r
-            for j in range(m.entries.size):
+            for j in range(m.entry_count):
                 r, c = m.entry_rows[j], m.entry_columns[j]
                 begins[r], ends[r] = min(begins[r], c), max(ends[r], c)
             for r in range(rows):
                 for i in range(16 * begins[r], 16 * (ends[r] + 1), 8):
                     put(lu, 16 * rows * r + i, splat8(0.0))
                 put(lu, 16 * (rows + 1) * r, splat8(1.0))
-            for j in range(m.entries.size):
+            for j in range(m.entry_count):
                 r, c = m.entry_rows[j], m.entry_columns[j]
                 i, slope = 16 * (rows * r + c), splat8(m.entries[j] * m.factor[c])
                 put(lu, i, fma(-z, slope, get(lu, i)))
@@ -145,7 +145,7 @@ def resolve(ctx, m, group):
     z_i are the eigenvalues of a group. In the second-order form, where J couples q' to p and p' to
     q only, elimination of the first leaves systems of R rows.
     """
-    rows, h, unknowns = ctx.rows, ctx.h, m.state.size
+    rows, h, unknowns = ctx.rows, ctx.h, m.unknowns
     step = 8 * m.padded
     v = m.v + 2 * step * group
     last = v + (m.parts - 1) * m.wide
@@ -155,7 +155,7 @@ def resolve(ctx, m, group):
     if ctx.second:
         z, w = get(m.eigen, 16 * group), get(m.eigen, 16 * group + 8)
         for above in range(0, 8 * rows, 8 * unknowns):
-            for j in range(m.entries.size):
+            for j in range(m.entry_count):
                 r, c = above + 8 * m.entry_rows[j], above + 8 * m.entry_columns[j]
                 slope, a, b = splat8(h * m.entries[j]), get(v, c), get(v, step + c)
                 put(x, r, fma(slope, fma(z, a, -w * b), get(x, r)))

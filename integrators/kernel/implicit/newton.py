@@ -111,7 +111,7 @@ def renew(ctx, m):
         take_stage(ctx, m, 0)
         linearize(ctx, m, ctx.times[0])
     else:
-        for d in range(m.state.size):
+        for d in range(m.unknowns):
             m.state[d] = ctx.scratch.row_state[d]
         linearize(ctx, m, ctx.t0 + ctx.n * ctx.h)
     m.contraction = m.radius * contraction(m)

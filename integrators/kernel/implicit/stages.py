@@ -9,7 +9,7 @@ p'; what is said of the field's coefficients is about the last block, what moves
 """
 
 from integrators.kernel.implicit.workspace import Workspace
-from integrators.kernel.native.attributes import address, view
+from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.lanes import fma
 from integrators.kernel.simd.memory import get, larger, largest, put, splat8, spread
@@ -127,7 +127,7 @@ def measure(ctx, m):
         for d in range(ctx.rows):
             drift = abs(ctx.scratch.row_drift[d])
             enter_size(ctx, d, max(drift, abs(m.factor[d] * m.gamma[m.block + 8 * d])))
-        invert_sizes(ctx, address(m.slope_strict), address(m.slope_floored))
+        invert_sizes(ctx, m.slope_strict, m.slope_floored)
 
 
 @compiled

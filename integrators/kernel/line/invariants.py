@@ -78,8 +78,8 @@ def keep_invariants(ctx):
 def set_gram(ctx):
     """Set the matrix of the equations for alpha, its lower half."""
     terms, legendre, metric, gram = ctx.terms, ctx.legendre, ctx.metric, ctx.gram
-    dim, every = ctx.rows, ctx.every
-    for a in range(ctx.invariants):
+    dim, every, n = ctx.rows, ctx.every, ctx.invariants
+    for a in range(n):
         for b in range(a + 1):
             first, second = dim * (1 + a), dim * (1 + b)
             for d in range(dim):
@@ -88,7 +88,7 @@ def set_gram(ctx):
                     i = 8 * every * group
                     products += get(legendre, i + 8 * (first + d)) * get(legendre, i + 8 * (second + d))
                 terms[d] = total(products) * metric[d]
-            gram[a, b] = ordered(ctx)
+            gram[n * a + b] = ordered(ctx)
 
 
 @compiled
@@ -117,16 +117,16 @@ def solve_gram(ctx, right, threshold):
     gram, lower, pivots, active = ctx.gram, ctx.lower, ctx.pivots, ctx.active
     n = ctx.invariants
     for a in range(n):
-        pivot = gram[a, a]
+        pivot = gram[n * a + a]
         for b in range(a):
-            value = gram[a, b]
+            value = gram[n * a + b]
             for c in range(b):
-                value -= lower[a, c] * lower[b, c] * pivots[c]
-            lower[a, b] = value / pivots[b] if pivots[b] > 0.0 else 0.0
-            pivot -= lower[a, b] * lower[a, b] * pivots[b]
-        pivots[a] = pivot if active[a] and pivot > threshold * gram[a, a] else 0.0
+                value -= lower[n * a + c] * lower[n * b + c] * pivots[c]
+            lower[n * a + b] = value / pivots[b] if pivots[b] > 0.0 else 0.0
+            pivot -= lower[n * a + b] * lower[n * a + b] * pivots[b]
+        pivots[a] = pivot if active[a] and pivot > threshold * gram[n * a + a] else 0.0
         for b in range(a):
-            right[a] -= lower[a, b] * right[b]
+            right[a] -= lower[n * a + b] * right[b]
         if pivots[a] == 0.0:
             right[a] = 0.0
     for a in range(n):
@@ -134,7 +134,7 @@ def solve_gram(ctx, right, threshold):
     for a in range(n - 1, -1, -1):
         for b in range(a + 1, n):
             if pivots[a] > 0.0:
-                right[a] -= lower[b, a] * right[b]
+                right[a] -= lower[n * b + a] * right[b]
 
 
 @compiled

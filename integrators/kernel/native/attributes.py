@@ -12,7 +12,6 @@ from numba.extending import (
     models,
     register_model,
 )
-from numba.np import arrayobj
 
 from integrators.kernel.native.memory import Integer, Memory, Part, Real, Table
 from integrators.kernel.simd.emit import INTEGER
@@ -40,8 +39,6 @@ def _kind(slot: Any) -> Any:
         return types.int64
     if isinstance(slot, Real):
         return types.float64
-    if isinstance(slot, Table):
-        return types.Array(types.float64 if slot.of is float else types.int64, len(slot.shape), "C")
     return DOUBLES if slot.of is float else INTEGERS
 
 
@@ -69,25 +66,10 @@ def _get(context, builder, typ, value, attr):
         return builder.gep(value, [ir.Constant(INTEGER, typ.declared.part_of[attr].place)])
     slot = typ.declared.slots[attr]
     kind = _kind(slot)
-    if not isinstance(slot, Table):
-        return builder.load(_word(context, builder, value, slot, kind))
-
-    def fixed(slot: Any, kind: Any) -> Any:
-        # Neither the address of a table nor its sizes change while compiled code runs: loops load them once.
-        word = builder.load(_word(context, builder, value, slot, kind))
-        word.set_metadata("invariant.load", builder.module.add_metadata([]))
-        return word
-
-    sizes = [
-        ir.Constant(INTEGER, n) if isinstance(n, int) else fixed(typ.declared.slots[n], types.int64)
-        for n in slot.shape
-    ]
-    array = context.make_array(kind)(context, builder)
-    item = ir.Constant(INTEGER, 8)
-    strides = [builder.mul(sizes[-1], item), item] if kind.ndim == 2 else [item]
-    data = fixed(slot, types.CPointer(kind.dtype))
-    arrayobj.populate_array(array, data, sizes, strides, item, meminfo=None)
-    return array._getvalue()
+    held = builder.load(_word(context, builder, value, slot, kind))
+    if isinstance(slot, Table):
+        held.set_metadata("invariant.load", builder.module.add_metadata([]))
+    return held
 
 
 @lower_setattr_generic(MemoryType)
@@ -108,13 +90,3 @@ def view(declared: type[Memory]) -> Any:
         return signature(kind, types.intp), generate
 
     return at
-
-
-@intrinsic
-def address(typing, array):
-    """Return where the numbers of numba's array are, as slots of `Array` have it."""
-
-    def generate(context, builder, sig, args):
-        return context.make_array(sig.args[0])(context, builder, args[0]).data
-
-    return signature(DOUBLES if array.dtype == types.float64 else INTEGERS, array), generate

@@ -154,7 +154,7 @@ class Array(Slot):
 
 
 class Table(Array):
-    """An `Array` that compiled code sees as numba's own array, with its shape: ``x[i, j]``, ``x.shape``."""
+    """An `Array` that stays where it is: its address is loaded before a loop, not after each store in it."""
 
 
 Declared = TypeVar("Declared", bound="Part")
