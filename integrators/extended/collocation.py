@@ -10,8 +10,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numba import njit
-from numba.core.errors import NumbaError
+from numba import NumbaError, njit
 from numpy.typing import NDArray
 
 from integrators.extended.arithmetic import Numbers, minus, plus, times

@@ -5,8 +5,7 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from numba import njit
-from numba.core.errors import NumbaError
+from numba import NumbaError, njit
 from numpy.typing import ArrayLike
 
 from integrators.extended.arithmetic import FUNCTIONS, Numbers, minus, plus, product, times

@@ -45,7 +45,7 @@ class Lanes:
 
     Raises
     ------
-    numba.core.errors.NumbaError
+    numba.NumbaError
         If parameters that differ from lane to lane keep the field from running on lanes.
     """
 
@@ -189,7 +189,7 @@ def compiled_lanes(make: Callable[[], Made]) -> tuple[Made | None, float]:
     try:
         lanes_ = make()
     except Exception as error:
-        from numba.core.errors import NumbaError  # has been imported to compile
+        from numba import NumbaError  # has been imported to compile
 
         if not isinstance(error, NumbaError):
             raise

@@ -88,7 +88,7 @@ def compile_steps(system: System, form: Form, quantity: emit.Quantity) -> binary
 
     Raises
     ------
-    numba.core.errors.NumbaError
+    numba.NumbaError
         If the field cannot be compiled on lanes.
     """
     source = emit.source(system, quantity, "numba")

@@ -2,7 +2,6 @@
 
 from llvmlite import ir
 from numba import types
-from numba.core.typing.templates import signature
 
 from integrators.kernel.context import DONE, Context
 from integrators.kernel.events.memory import CACHED
@@ -29,7 +28,7 @@ def call_part(typing, steps, operation, own, partial, part, out):
         kind = ir.FunctionType(INTEGER, [INTEGER] * len(words))
         return builder.call(builder.inttoptr(function, kind.as_pointer()), words)
 
-    return signature(types.int64, *[types.int64] * 5, DOUBLES), generate
+    return types.int64(*[types.int64] * 5, DOUBLES), generate
 
 
 @compiled

@@ -4,15 +4,9 @@ from typing import Any
 
 from llvmlite import ir
 from numba import types
-from numba.core.typing.templates import AttributeTemplate, signature
-from numba.extending import (
-    infer_getattr,
-    lower_getattr_generic,
-    lower_setattr_generic,
-    models,
-    register_model,
-)
+from numba.extending import lower_setattr_generic, models, register_model
 
+from integrators.kernel.native import jit
 from integrators.kernel.native.memory import Integer, Memory, Part, Real, Table
 from integrators.kernel.simd.emit import INTEGER
 from integrators.kernel.simd.lanes import intrinsic
@@ -42,16 +36,12 @@ def _kind(slot: Any) -> Any:
     return DOUBLES if slot.of is float else INTEGERS
 
 
-@infer_getattr
-class _Attributes(AttributeTemplate):
-    key = MemoryType
-
-    def generic_resolve(self, typ: Any, attr: str) -> Any:
-        slot = typ.declared.slots.get(attr)
-        if slot is None:
-            part = typ.declared.part_of.get(attr)
-            return None if part is None else MemoryType(part.declared)
-        return _kind(slot)
+def _kind_of(memory: Any, name: str) -> Any:
+    """Return the numba type of an attribute, or ``None``."""
+    if (part := memory.declared.part_of.get(name)) is not None:
+        return MemoryType(part.declared)
+    slot = memory.declared.slots.get(name)
+    return None if slot is None else _kind(slot)
 
 
 def _word(context: Any, builder: Any, memory: Any, slot: Any, kind: Any) -> Any:
@@ -60,8 +50,7 @@ def _word(context: Any, builder: Any, memory: Any, slot: Any, kind: Any) -> Any:
     return builder.bitcast(place, context.get_value_type(kind).as_pointer())
 
 
-@lower_getattr_generic(MemoryType)
-def _get(context, builder, typ, value, attr):
+def _read(context, builder, typ, value, attr):
     if attr in typ.declared.part_of:
         return builder.gep(value, [ir.Constant(INTEGER, typ.declared.part_of[attr].place)])
     slot = typ.declared.slots[attr]
@@ -78,15 +67,22 @@ def _set(context, builder, sig, args, attr):
     builder.store(args[1], _word(context, builder, args[0], slot, _kind(slot)))
 
 
+def _names(declared: type[Memory | Part]) -> set[str]:
+    """Return the names of all that a memory holds, and its parts."""
+    parts = declared.part_of
+    return {*declared.slots, *parts}.union(*(_names(part.declared) for part in parts.values()))
+
+
 def view(declared: type[Memory]) -> Any:
     """Return what makes of an address (intp), in compiled code, a memory of that class."""
     kind = MemoryType(declared)
+    jit.attributes(MemoryType, _names(declared), _kind_of, _read)
 
     @intrinsic
     def at(typing, address):
         def generate(context, builder, sig, args):
             return builder.inttoptr(args[0], INTEGER.as_pointer())
 
-        return signature(kind, types.intp), generate
+        return kind(types.intp), generate
 
     return at

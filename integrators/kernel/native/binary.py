@@ -137,7 +137,7 @@ def build(
 
     Raises
     ------
-    numba.core.errors.NumbaError
+    numba.NumbaError
         If it cannot be compiled for these types.
     """
     with machine.alone():

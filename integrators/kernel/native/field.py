@@ -45,10 +45,10 @@ def build(function: Any, lanes: int) -> tuple[str, bytes]:
 
     Raises
     ------
-    numba.core.errors.NumbaError
+    numba.NumbaError
         If it can be compiled neither way.
     """
-    from numba.core.errors import NumbaError
+    from numba import NumbaError
 
     try:
         return ON_LANES, build_on_lanes(function, lanes)
@@ -61,10 +61,10 @@ def assembly(system: System, quantity: emit.Quantity, lanes: int) -> str:
 
     Raises
     ------
-    numba.core.errors.NumbaError
+    numba.NumbaError
         If it cannot be compiled.
     """
-    from numba.core.errors import NumbaError
+    from numba import NumbaError
 
     function = emit.numba(system, quantity).py_func
     try:

@@ -29,7 +29,7 @@ def field_of(system: System, quantity: emit.Quantity, lanes: int) -> binary.Nati
     ------
     problems.errors.InputError
         For another function than the field of a system that is not traced.
-    numba.core.errors.NumbaError
+    numba.NumbaError
         If a numba function cannot be compiled for arrays of numbers.
     """
     if not isinstance(system, Foreign) or quantity != "field":

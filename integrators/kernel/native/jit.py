@@ -94,3 +94,10 @@ instructions for `integrators.kernel.simd.values.Value`.
 
 module: Any = _way.module
 """Compile a `compiled` function; return a module of it and all that it calls, and its name there."""
+
+attributes: Any = _way.attributes
+"""Give values of a numba type attributes: ``attributes(kind, names, kind_of, read)``.
+
+``kind_of(value, name)`` returns the numba type of one, or ``None``, and ``read(context, builder, kind, value,
+name)`` writes the instructions that read it. May be called again with more names.
+"""

@@ -1,7 +1,7 @@
 """Memory that Python and compiled code share, by name.
 
 A subclass of `Memory` declares its slots once, with their types and shapes. Here
-they are attributes of an object; in compiled code `integrators.kernel.simd.attributes`
+they are attributes of an object; in compiled code `integrators.kernel.native.attributes`
 makes them attributes of its address:
 
     class Orbit(Memory):

@@ -5,24 +5,36 @@ into it, optimizes that, and makes machine code of it; for a hundred functions t
 each other this takes half a minute. Here a target of its own (numba's target extension)
 keeps of each function nothing but what it was lowered to, and `module` links those
 that an entry needs; `integrators.kernel.native.binary` does the rest once.
+
+No other file imports what numba does not promise to keep. Where a name below is gone, or does something else,
+`integrators.kernel.native.public` takes over for all of them.
 """
 
-from functools import cached_property
+from collections.abc import Iterable
+from functools import cache, cached_property
 from typing import Any, cast
 
 import llvmlite.binding as llvm
-from numba.core import codegen, cpu, registry, typed_passes, untyped_passes
-from numba.core.compiler import Compiler, CompilerBase
-from numba.core.compiler_machinery import PassManager
-from numba.core.target_extension import (
+from numba.core import (
+    codegen,  # the library of a function, which here is neither optimized nor linked
+    cpu,  # how types and operations are lowered for a processor
+    registry,  # the target of processors and its decorator, to derive ours from
+    typed_passes,  # passes of the compiler, of which ours has the few that plain functions need
+    untyped_passes,
+)
+from numba.core.compiler import Compiler, CompilerBase  # numba's list of passes, and what a list derives from
+from numba.core.compiler_machinery import PassManager  # such a list
+from numba.core.target_extension import (  # what tells numba of a target: its name, decorators, processor
     CPU,
     dispatcher_registry,
     jit_registry,
     target_override,
     target_registry,
 )
-from numba.core.typing import mathdecl
-from numba.core.typing.context import Context
+from numba.core.typing import mathdecl  # types of the functions of `math`
+from numba.core.typing.context import Context  # types of all else, without NumPy's
+from numba.core.typing.templates import AttributeTemplate  # types of attributes, asked for by name
+from numba.extending import infer_getattr, lower_getattr_generic
 
 NAME = "hbvm kernel"
 OPTIONS = {
@@ -147,12 +159,29 @@ dispatcher_registry[_Processor] = _Function
 jit_registry[_Processor] = _jit
 
 
+@cache
+def _attributes(kind: Any, kind_of: Any, read: Any) -> None:
+    class Attributes(AttributeTemplate):
+        key = kind
+
+        def generic_resolve(self, value: Any, name: str) -> Any:
+            return kind_of(value, name)
+
+    infer_getattr(Attributes)
+    lower_getattr_generic(kind)(read)
+
+
+def attributes(kind: Any, names: Iterable[str], kind_of: Any, read: Any) -> None:
+    """Give values attributes in compiled code; see `integrators.kernel.native.jit`."""
+    _attributes(kind, kind_of, read)  # numba asks for any name
+
+
 def module(function: Any, kinds: tuple[Any, ...]) -> tuple[Any, str]:
     """Compile a `compiled` function; return a module of it and all that it calls, and its name there.
 
     Raises
     ------
-    numba.core.errors.NumbaError
+    numba.NumbaError
         If it cannot be compiled for these types.
     """
     function.compile(kinds)

@@ -4,15 +4,13 @@ numba optimizes and links each function by itself, which takes longer, and gives
 of what it has made (``inspect_llvm``). The machine code is made of that text as of what `private` lowers.
 """
 
-import re
+from collections.abc import Iterable
+from functools import cache
 from typing import Any
 
 import llvmlite.binding as llvm
 from numba import njit
-from numba.extending import register_jitable
-
-COUNTING = ("NRT_incref", "NRT_decref")
-"""Reference counts. The kernel's arrays are views of memory that Python owns: there is nothing to count."""
+from numba.extending import intrinsic, overload_attribute, register_jitable
 
 
 def compiled(function: Any) -> Any:
@@ -25,29 +23,35 @@ def for_both_widths(function: Any) -> Any:
     return register_jitable(error_model="numpy")(function)
 
 
+@cache
+def _attribute(kind: Any, name: str, kind_of: Any, read: Any) -> None:
+    @intrinsic
+    def get(typing, memory):
+        def generate(context, builder, sig, args):
+            return read(context, builder, sig.args[0], args[0], name)
+
+        result = kind_of(memory, name)
+        return None if result is None else (result(memory), generate)
+
+    overload_attribute(kind, name)(lambda memory: lambda memory: get(memory))  # type: ignore[call-arg]
+
+
+def attributes(kind: Any, names: Iterable[str], kind_of: Any, read: Any) -> None:
+    """Give values attributes in compiled code, each a function; see `integrators.kernel.native.jit`."""
+    for name in names:
+        _attribute(kind, name, kind_of, read)
+
+
 def module(function: Any, kinds: tuple[Any, ...]) -> tuple[Any, str]:
     """Compile a `compiled` function; return a module of it and all that it calls, and its name there.
 
     Raises
     ------
-    numba.core.errors.NumbaError
+    numba.NumbaError
         If it cannot be compiled for these types.
     """
     function.compile(kinds)
     parsed = llvm.parse_assembly(function.inspect_llvm(kinds))
     names = {function_.name for function_ in parsed.functions if not function_.is_declaration}
     (name,) = (function_ for function_ in names if f"cfunc.{function_}" in names)
-    return _uncounted(parsed), name
-
-
-def _uncounted(parsed: Any) -> Any:
-    """Return a module whose reference counts are nobody's: it needs nothing of numba when it is loaded."""
-    text = str(parsed)
-    for name in COUNTING:
-        text = re.sub(
-            rf"(?ms)^define [^\n]*@{name}\(.*?^\}}\n", f"define void @{name}(ptr %0) {{ ret void }}\n", text
-        )
-        text = re.sub(
-            rf"(?m)^declare [^\n]*@{name}\(.*$", f"define void @{name}(ptr %0) {{ ret void }}", text
-        )
-    return llvm.parse_assembly(text)
+    return parsed, name

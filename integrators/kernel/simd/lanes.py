@@ -12,12 +12,11 @@ A vector field reads and writes them through the views of `integrators.kernel.si
 
 import math
 import operator
+from inspect import signature
 from typing import Any, cast
 
 from llvmlite import ir
 from numba import extending, types
-from numba.core.typing import templates
-from numba.core.typing.templates import AbstractTemplate, signature
 from numba.extending import models, register_model
 
 from integrators.kernel.simd import operations
@@ -26,7 +25,7 @@ from integrators.kernel.simd.operations import fma, two_sum
 
 # What numba makes of a decorated function has another signature than the function.
 intrinsic = cast(Any, extending.intrinsic)
-infer_global = cast(Any, templates.infer_global)
+type_callable = cast(Any, extending.type_callable)
 lower_builtin = cast(Any, extending.lower_builtin)
 
 
@@ -72,12 +71,13 @@ def spread_to(builder: Any, kinds: Any, values: Any, count: int) -> list[Any]:
 def register(function: Any, arity: int, result: Any, emit: Any) -> None:
     """Give ``function`` a meaning on lanes: its typing, and one lowering per mixture with scalars."""
 
-    class Template(AbstractTemplate):
-        def generic(self, args: Any, kws: Any) -> Any:
-            count = None if kws or len(args) != arity else _count(*args)
-            return None if count is None else signature(result(count), *arguments_for(args))
+    def resolve(*args: Any) -> Any:
+        count = _count(*args)
+        return None if count is None else result(count)(*arguments_for(args))
 
-    infer_global(function)(Template)
+    # numba asks the function that types a call how many arguments it takes.
+    typed = (lambda x: resolve(x)) if arity == 1 else (lambda x, y: resolve(x, y))
+    type_callable(function)(lambda context: typed)
 
     def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         count = _count(*sig.args)
@@ -127,11 +127,13 @@ for _function, _name in (
 # --- explicit operations --------------------------------------------------------------------------
 
 
-@infer_global(fma)
-class _Fma(AbstractTemplate):
-    def generic(self, args: Any, kws: Any) -> Any:
-        count = _count(*args)
-        return signature(types.float64 if count is None else Lanes(count), *arguments_for(args))
+@type_callable(fma)
+def _type_fma(context):
+    def typed(x, y, z):
+        count = _count(x, y, z)
+        return (types.float64 if count is None else Lanes(count))(*arguments_for([x, y, z]))
+
+    return typed
 
 
 @lower_builtin(fma, types.VarArg(types.Any))
@@ -147,11 +149,13 @@ def added(builder: Any, x: Any, y: Any) -> tuple[Any, Any]:
     return s, builder.fadd(builder.fsub(x, builder.fsub(s, part)), builder.fsub(y, part))
 
 
-@infer_global(two_sum)
-class _TwoSum(AbstractTemplate):
-    def generic(self, args: Any, kws: Any) -> Any:
-        kinds = arguments_for(args)
-        return signature(types.UniTuple(kinds[0], 2), *kinds)
+@type_callable(two_sum)
+def _type_two_sum(context):
+    def typed(x, y):
+        kinds = arguments_for([x, y])
+        return types.UniTuple(kinds[0], 2)(*kinds)
+
+    return typed
 
 
 @lower_builtin(two_sum, types.VarArg(types.Any))
@@ -165,11 +169,11 @@ def _two_sum(context, builder, sig, args):
 def _on_numbers(operation: Any, kinds: list[Any], result: Any, emit: Any) -> None:
     """Give an operation a meaning on numbers."""
 
-    class Template(AbstractTemplate):
-        def generic(self, args: Any, kws: Any) -> Any:
-            return None if kws or len(args) != len(kinds) else signature(result, *kinds)
+    def typed(*args: Any) -> Any:
+        return result(*kinds)
 
-    infer_global(operation)(Template)
+    typed.__signature__ = signature(operation)  # type: ignore[attr-defined]
+    type_callable(operation)(lambda context: typed)
     lower_builtin(operation, *kinds)(lambda context, builder, sig, args: emit(builder, *args))
 
 

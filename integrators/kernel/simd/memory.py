@@ -8,7 +8,6 @@ from typing import Any
 
 from llvmlite import ir
 from numba import types
-from numba.core.typing.templates import signature
 
 from integrators.kernel.simd.emit import (
     ALIGNMENT,
@@ -35,7 +34,7 @@ def get(typing, base, index):
     def generate(context, builder, sig, args):
         return builder.load(element(builder, args[0], args[1], 1, vector(WIDTH)), align=ALIGNMENT)
 
-    return signature(EIGHT, DOUBLES, types.int64), generate
+    return EIGHT(DOUBLES, types.int64), generate
 
 
 @intrinsic
@@ -46,7 +45,7 @@ def put(typing, base, index, item):
         builder.store(args[2], element(builder, args[0], args[1], 1, vector(WIDTH)), align=ALIGNMENT)
         return context.get_dummy_value()
 
-    return signature(types.void, DOUBLES, types.int64, EIGHT), generate
+    return types.void(DOUBLES, types.int64, EIGHT), generate
 
 
 @intrinsic
@@ -56,7 +55,7 @@ def spread(typing, base, index):
     def generate(context, builder, sig, args):
         return splat(builder, builder.load(element(builder, args[0], args[1], 1, DOUBLE)), WIDTH)
 
-    return signature(EIGHT, DOUBLES, types.int64), generate
+    return EIGHT(DOUBLES, types.int64), generate
 
 
 @intrinsic
@@ -66,7 +65,7 @@ def splat8(typing, value):
     def generate(context, builder, sig, args):
         return splat(builder, args[0], WIDTH)
 
-    return signature(EIGHT, types.float64), generate
+    return EIGHT(types.float64), generate
 
 
 @intrinsic(prefer_literal=True)
@@ -83,7 +82,7 @@ def columns(typing, base, index, count):
             values.append(builder.load(element(builder, args[0], offset, 1, vector(WIDTH)), align=ALIGNMENT))
         return context.make_tuple(builder, result, values)
 
-    return signature(result, DOUBLES, types.int64, count), generate
+    return result(DOUBLES, types.int64, count), generate
 
 
 @intrinsic
@@ -98,7 +97,7 @@ def combine(typing, vectors, base, index, start):
     def generate(context, builder, sig, args):
         return _combined(builder, args[0], args[1], args[2], count, args[3])
 
-    return signature(EIGHT, vectors, DOUBLES, types.int64, EIGHT), generate
+    return EIGHT(vectors, DOUBLES, types.int64, EIGHT), generate
 
 
 @intrinsic
@@ -109,7 +108,7 @@ def combine_only(typing, vectors, base, index):
     def generate(context, builder, sig, args):
         return _combined(builder, args[0], args[1], args[2], count, None)
 
-    return signature(EIGHT, vectors, DOUBLES, types.int64), generate
+    return EIGHT(vectors, DOUBLES, types.int64), generate
 
 
 def _combined(builder: Any, vectors: Any, base: Any, index: Any, count: int, start: Any) -> Any:
@@ -146,7 +145,7 @@ def sums(typing, v0, v1, v2, v3, v4, v5, v6, v7):
             args = [builder.fadd(*_halves(builder, args[i], args[i + n], places)) for i in range(n)]
         return args[0]
 
-    return signature(EIGHT, *[EIGHT] * 8), generate
+    return EIGHT(*[EIGHT] * 8), generate
 
 
 @intrinsic
@@ -162,7 +161,7 @@ def sums_and_rests(typing, v0, v1, v2, v3, v4, v5, v6, v7):
         less = builder.fadd(*_halves(builder, lost, more, last[1:]))
         return context.make_tuple(builder, sig.return_type, [total, builder.fadd(rest, less)])
 
-    return signature(types.UniTuple(EIGHT, 2), *[EIGHT] * 8), generate
+    return types.UniTuple(EIGHT, 2)(*[EIGHT] * 8), generate
 
 
 @intrinsic
@@ -172,7 +171,7 @@ def swap(typing, x):
     def generate(context, builder, sig, args):
         return builder.shuffle_vector(args[0], args[0], indices(4, 5, 6, 7, 0, 1, 2, 3))
 
-    return signature(EIGHT, EIGHT), generate
+    return EIGHT(EIGHT), generate
 
 
 def _half(first: int) -> Any:
@@ -183,7 +182,7 @@ def _half(first: int) -> Any:
             builder.store(part, element(builder, args[0], args[1], 1, part.type), align=32)
             return context.get_dummy_value()
 
-        return signature(types.void, DOUBLES, types.int64, EIGHT), generate
+        return types.void(DOUBLES, types.int64, EIGHT), generate
 
     return put_half
 
@@ -199,7 +198,7 @@ def larger(typing, x, y):
     def generate(context, builder, sig, args):
         return larger_of(builder, *args)
 
-    return signature(EIGHT, EIGHT, EIGHT), generate
+    return EIGHT(EIGHT, EIGHT), generate
 
 
 def _reduce(pick: Any) -> Any:
@@ -208,7 +207,7 @@ def _reduce(pick: Any) -> Any:
         def generate(context, builder, sig, args):
             return reduced(builder, pick, args[0])
 
-        return signature(types.float64, EIGHT), generate
+        return types.float64(EIGHT), generate
 
     return reduce
 
@@ -227,13 +226,13 @@ def _caller(arguments: int, returns: Any = types.void) -> Any:
         return context.get_dummy_value() if returns == types.void else returned
 
     def two(typing, function, a, b):
-        return signature(returns, types.int64, a, b), generate
+        return returns(types.int64, a, b), generate
 
     def three(typing, function, a, b, c):
-        return signature(returns, types.int64, a, b, c), generate
+        return returns(types.int64, a, b, c), generate
 
     def four(typing, function, a, b, c, d):
-        return signature(returns, types.int64, a, b, c, d), generate
+        return returns(types.int64, a, b, c, d), generate
 
     return intrinsic({2: two, 3: three, 4: four}[arguments])
 

@@ -13,17 +13,16 @@ from typing import Any
 
 from llvmlite import ir
 from numba import types
-from numba.core.typing.templates import AbstractTemplate, signature
 from numba.extending import models, register_model
 
 from integrators.kernel.simd.emit import ALIGNMENT, DOUBLE, INTEGER, vector
 from integrators.kernel.simd.lanes import (
     Lanes,
     arguments_for,
-    infer_global,
     intrinsic,
     lower_builtin,
     spread_to,
+    type_callable,
 )
 
 
@@ -74,37 +73,40 @@ def element(builder: Any, pointer: Any, index: Any, stride: int, kind: Any) -> A
     return builder.bitcast(builder.gep(pointer, [index]), kind.as_pointer())
 
 
-@infer_global(operator.getitem)
-class _GetItem(AbstractTemplate):
-    def generic(self, args: Any, kws: Any) -> Any:
-        view, index = args
+@type_callable(operator.getitem)
+def _type_get(context):
+    def typed(view, index):
         if not isinstance(index, types.Integer):
             return None
         if isinstance(view, Rows):
-            return signature(Lanes(view.count), view, types.intp)
-        return signature(view.of, view, types.intp) if isinstance(view, Numbers) else None
+            return Lanes(view.count)(view, types.intp)
+        return view.of(view, types.intp) if isinstance(view, Numbers) else None
+
+    return typed
 
 
-@infer_global(operator.setitem)
-class _SetItem(AbstractTemplate):
-    def generic(self, args: Any, kws: Any) -> Any:
-        view, index, value = args
+@type_callable(operator.setitem)
+def _type_set(context):
+    def typed(view, index, value):
         if not isinstance(index, types.Integer):
             return None
         if isinstance(view, Rows) and isinstance(value, Lanes | types.Number):
-            return signature(types.none, view, types.intp, *arguments_for([value]))
+            return types.none(view, types.intp, *arguments_for([value]))
         if isinstance(view, Numbers) and isinstance(value, types.Number):
-            return signature(types.none, view, types.intp, view.of)
+            return types.none(view, types.intp, view.of)
         return None
 
+    return typed
 
-@infer_global(operator.add)
-class _Shift(AbstractTemplate):
-    def generic(self, args: Any, kws: Any) -> Any:
-        view, count = args
+
+@type_callable(operator.add)
+def _type_shifted(context):
+    def typed(view, count):
         if isinstance(view, Numbers) and isinstance(count, types.Integer):
-            return signature(view, view, types.intp)
+            return view(view, types.intp)
         return None
+
+    return typed
 
 
 @lower_builtin(operator.getitem, Rows, types.Integer)
@@ -148,7 +150,7 @@ def strided(typing, address, stride):
     def generate(context, builder, sig, args):
         return builder.inttoptr(args[0], DOUBLE.as_pointer())
 
-    return signature(Numbers(stride.literal_value), types.intp, stride), generate
+    return Numbers(stride.literal_value)(types.intp, stride), generate
 
 
 def _view(kind: Numbers) -> Any:
@@ -157,7 +159,7 @@ def _view(kind: Numbers) -> Any:
         def generate(context, builder, sig, args):
             return builder.inttoptr(args[0], _item(kind).as_pointer())
 
-        return signature(kind, types.intp), generate
+        return kind(types.intp), generate
 
     return view
 

@@ -38,7 +38,7 @@ class VectorLanes(Lanes):
 
     Raises
     ------
-    numba.core.errors.NumbaError
+    numba.NumbaError
         If parameters that differ from lane to lane keep the field from running on lanes.
     """
 

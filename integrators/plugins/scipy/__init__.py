@@ -166,7 +166,7 @@ class HBVM(OdeSolver):
         self, fun: Any, compiled: Field, k: int | None, h: float | None, first_step: float | None, every: int
     ) -> NativeSteps | None:
         """Return steps in compiled code; ``None``, with a warning, if numba cannot compile the function."""
-        from numba.core.errors import NumbaError
+        from numba import NumbaError
 
         try:
             return NativeSteps(self, compiled, k=k, s=self.s, h=h, first_step=first_step, every=every)

@@ -48,7 +48,7 @@ class NativeSteps:
 
     Raises
     ------
-    numba.core.errors.NumbaError
+    numba.NumbaError
         If a numba function cannot be compiled for arrays of numbers.
     """
 

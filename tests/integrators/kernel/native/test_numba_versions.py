@@ -1,5 +1,6 @@
 """Without private parts of numba and llvmlite, and with a numba that nobody has tried."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -22,8 +23,10 @@ kept = importlib.metadata.version
 importlib.metadata.version = lambda name: "0.99.0" if name == "numba" else kept(name)
 """
 PRIVATE = "numba.core.registry:CPUTarget"  # numba itself needs it at its import only
-WAYS = "import pytest; sys.exit(pytest.main([*{options!r}, '-W', 'default', {file!r}]))"
+WAYS = "import pytest; sys.exit(pytest.main([*{options!r}, '-W', 'default', *{tests!r}]))"
+OPTIONS = ["-o", "addopts=", "-q", "-p", "no:cacheprovider"]
 ROOT = Path(__file__).parents[4]
+PACKAGES = "integrators", "problems", "hbvm_bench"
 
 
 def run(tmp_path, code, cache="cache"):
@@ -31,6 +34,13 @@ def run(tmp_path, code, cache="cache"):
         [sys.executable, "-c", HIDE + code], cwd=ROOT, capture_output=True, text=True, check=False,
         env={"HBVM_BENCH_CACHE": str(tmp_path / cache), "PATH": "", "HOME": str(tmp_path)},
     )  # fmt: skip
+
+
+def test_one_file_imports_private_parts_of_numba():
+    private = re.compile(r"\b(?:from|import) numba\.(?!extending\b)|\bnumba\.(?:core|np)\b")
+    files = [file for package in PACKAGES for file in (ROOT / package).rglob("*.py")]
+    found = [file for file in files if private.search(file.read_text("utf-8"))]
+    assert found == [ROOT / "integrators/kernel/native/private.py"]
 
 
 def test_a_numba_that_can_do_nothing_gives_a_sentence(tmp_path):
@@ -60,13 +70,20 @@ def test_a_newer_numba_is_tried(tmp_path, shim, way):
     assert done.stderr.count("RuntimeWarning: numba ") == (way == "public")
 
 
-@pytest.mark.slow
-def test_each_way_through_the_kernel_by_the_public_interface(tmp_path):
-    options = ["-o", "addopts=", "-q", "-p", "no:cacheprovider", "-m", "portable"]
-    file = "tests/integrators/test_processors.py"
-    done = run(tmp_path, f"hide({PRIVATE!r})\n" + WAYS.format(options=options, file=file))
+def by_the_public_interface(tmp_path, options, *tests):
+    done = run(tmp_path, f"hide({PRIVATE!r})\n" + WAYS.format(options=OPTIONS + options, tests=tests))
     assert done.returncode == 0, done.stdout[-3000:]
     assert "numba's public interface" in done.stdout
+
+
+def test_memory_by_name_by_the_public_interface(tmp_path):
+    file = "tests/integrators/kernel/native/test_memory.py"
+    by_the_public_interface(tmp_path, [], f"{file}::test_compiled_code_reads_and_writes_a_part")
+
+
+@pytest.mark.slow
+def test_each_way_through_the_kernel_by_the_public_interface(tmp_path):
+    by_the_public_interface(tmp_path, ["-m", "portable"], "tests/integrators/test_processors.py")
 
 
 def test_machine_code_is_loaded_without_mcjit(tmp_path):

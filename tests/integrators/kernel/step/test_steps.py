@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from numba.core.errors import TypingError
+from numba import TypingError
 
 import problems
 from integrators.coefficients import legendre
