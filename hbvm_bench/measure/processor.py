@@ -14,6 +14,8 @@ from typing import Any
 
 import llvmlite.binding as llvm
 
+from integrators.kernel.native import machine
+
 CHAINS = 12  # independent sums: more than latency times throughput, fewer than there are registers
 LINKS = 32  # dependent operations in one turn of the chain's loop
 TURNS = 20_000
@@ -29,9 +31,7 @@ def measured() -> dict[str, str | int]:
     time; it takes some 20 ms.
     """
     widest = _widest()
-    engine = _compiled("\n".join([_sums("wide", widest // 64), _sums("narrow", widest // 128), _chain()]))
-    # the engine owns the code, and lives as long as this call
-    wide, narrow, chain = (_function(engine, name) for name in ("wide", "narrow", "chain"))
+    wide, narrow, chain = (_compiled(text) for text in (_sums(widest // 64), _sums(widest // 128), _chain()))
     rounds = [[_time(function) for function in (wide, narrow, chain)] for _ in range(ROUNDS)]
     of_wide, of_narrow, of_chain = (min(each) for each in zip(*rounds, strict=True))
     return {
@@ -52,30 +52,24 @@ def _time(function: Any) -> float:
     return perf_counter() - start
 
 
-def _function(engine: Any, name: str) -> Any:
-    address = engine.get_function_address(name)
-    return ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64)(address)
-
-
 def _compiled(text: str) -> Any:
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
-    machine = llvm.Target.from_triple(llvm.get_process_triple()).create_target_machine(
+    target = llvm.Target.from_triple(llvm.get_process_triple()).create_target_machine(
         cpu=llvm.get_host_cpu_name(), features=llvm.get_host_cpu_features().flatten(), opt=2, jit=True
     )
-    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(text), machine)
-    engine.finalize_object()
-    return engine
+    address = machine.load(machine.object_file(target, llvm.parse_assembly(text)))
+    return ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64)(address)
 
 
-def _loop(name: str, kind: str, start: str, body: str, lasts: list[str]) -> str:
+def _loop(kind: str, start: str, body: str, lasts: list[str]) -> str:
     """Return a function that carries values through a loop and stores the last of each."""
     phis = "\n".join(
         f"  %x{i} = phi {kind} [ {start}, %entry ], [ {last}, %loop ]" for i, last in enumerate(lasts)
     )
     stores = "\n".join(f"  store {kind} {last}, ptr %out, align 8" for last in lasts)
     return f"""
-define void @{name}(i64 %turns, ptr %out) {{
+define void @{machine.ENTRY}(i64 %turns, ptr %out) {{
 entry:
   %a = load volatile {kind}, ptr %out, align 8
   %b = load volatile {kind}, ptr %out, align 8
@@ -93,13 +87,13 @@ done:
 }}"""
 
 
-def _sums(name: str, lanes: int) -> str:
+def _sums(lanes: int) -> str:
     kind = f"<{lanes} x double>"
     fma = f"@llvm.fma.v{lanes}f64"
     lines = [f"  %y{i} = call {kind} {fma}({kind} %x{i}, {kind} %a, {kind} %b)" for i in range(CHAINS)]
     lasts = [f"%y{i}" for i in range(CHAINS)]
     return f"declare {kind} {fma}({kind}, {kind}, {kind})" + _loop(
-        name, kind, "zeroinitializer", "\n".join(lines), lasts
+        kind, "zeroinitializer", "\n".join(lines), lasts
     )
 
 
@@ -109,4 +103,4 @@ def _chain() -> str:
     for i in range(0, LINKS, 2):
         lines += [f"  %y{i} = add i64 {last}, %a", f"  %y{i + 1} = xor i64 %y{i}, %b"]
         last = f"%y{i + 1}"
-    return _loop("chain", "i64", "0", "\n".join(lines), [last])
+    return _loop("i64", "0", "\n".join(lines), [last])

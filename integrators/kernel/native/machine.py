@@ -140,7 +140,6 @@ def _machine() -> Any:
         cpu=processor(),
         features=features(),
         opt=3,
-        reloc="static",
         codemodel="jitdefault",
         jit=True,
     )

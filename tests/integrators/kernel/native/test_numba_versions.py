@@ -22,8 +22,18 @@ import importlib.metadata
 kept = importlib.metadata.version
 importlib.metadata.version = lambda name: "0.99.0" if name == "numba" else kept(name)
 """
+WITHOUT_MCJIT = """
+from integrators.kernel.native import machine
+class Binding:
+    def __getattr__(self, name):
+        if name == "create_mcjit_compiler":
+            raise AttributeError(name)
+        return getattr(binding, name)
+binding, machine.llvm = machine.llvm, Binding()
+"""
 PRIVATE = "numba.core.registry:CPUTarget"  # numba itself needs it at its import only
 WAYS = "import pytest; sys.exit(pytest.main([*{options!r}, '-W', 'default', *{tests!r}]))"
+EACH_WAY = "tests/integrators/test_processors.py"
 OPTIONS = ["-o", "addopts=", "-q", "-p", "no:cacheprovider"]
 ROOT = Path(__file__).parents[4]
 PACKAGES = "integrators", "problems", "hbvm_bench"
@@ -83,20 +93,23 @@ def test_memory_by_name_by_the_public_interface(tmp_path):
 
 @pytest.mark.slow
 def test_each_way_through_the_kernel_by_the_public_interface(tmp_path):
-    by_the_public_interface(tmp_path, ["-m", "portable"], "tests/integrators/test_processors.py")
+    by_the_public_interface(tmp_path, ["-m", "portable"], EACH_WAY)
+
+
+@pytest.mark.slow
+def test_each_way_through_the_kernel_without_mcjit(tmp_path):
+    done = run(tmp_path, WITHOUT_MCJIT + WAYS.format(options=[*OPTIONS, "-m", "portable"], tests=[EACH_WAY]))
+    assert done.returncode == 0, done.stdout[-3000:]
 
 
 def test_machine_code_is_loaded_without_mcjit(tmp_path):
     code = """
-import llvmlite.binding as llvm
-from integrators.kernel.native import machine as native
-del llvm.create_mcjit_compiler
-machine = native._machine()
-text = "define i64 @hbvm_entry(i64 %x) { %y = mul i64 %x, 3 ret i64 %y }"
 import ctypes
+import llvmlite.binding as llvm
+text = "define i64 @hbvm_entry(i64 %x) { %y = mul i64 %x, 3 ret i64 %y }"
 for _ in range(2):  # two of the same name
-    address = native.load(machine.emit_object(llvm.parse_assembly(text)))
+    address = machine.load(machine._machine().emit_object(llvm.parse_assembly(text)))
     print(ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)(address)(14))
 """
-    done = run(tmp_path, code)
+    done = run(tmp_path, WITHOUT_MCJIT + code)
     assert done.stdout.split() == ["42", "42"], done.stderr
