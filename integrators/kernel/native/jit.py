@@ -7,7 +7,7 @@ version that no test has seen is tried on a small function first, and where that
 import ctypes
 import warnings
 from importlib.metadata import version
-from typing import Any
+from typing import Any, cast
 
 from integrators.kernel.native import machine
 
@@ -44,10 +44,26 @@ def _checked(way: Any) -> Any:
         Of any type, by whatever that numba lacks.
     """
     from numba import types
+    from numba.extending import intrinsic, models, register_model
+
+    class Half(types.Type):
+        """A type with an attribute."""
+
+    register_model(Half)(models.OpaqueModel)
+    way.attributes(
+        Half,
+        ["value"],
+        lambda kind, name: types.float64,
+        lambda context, *_: context.get_constant(types.float64, 0.5),
+    )
+
+    @cast(Any, intrinsic)
+    def one_half(typing):
+        return Half("half")(), lambda context, *_: context.get_dummy_value()
 
     @way.for_both_widths
     def half(x):
-        return x * 0.5
+        return x * one_half().value
 
     @way.compiled
     def summed(n):

@@ -72,7 +72,20 @@ def test_a_wrong_number_is_not_believed(tmp_path):
     assert "a sum of 18 is 17" in done.stderr.strip().splitlines()[-1]
 
 
-@pytest.mark.parametrize(("shim", "way"), [(NEWER, "private"), (f"hide({PRIVATE!r})\n", "public")])
+OTHER_ATTRIBUTES = (
+    NEWER
+    + """
+from integrators.kernel.native import private
+private.attributes = lambda *arguments: None
+"""
+)
+
+
+@pytest.mark.parametrize(
+    ("shim", "way"),
+    [(NEWER, "private"), (f"hide({PRIVATE!r})\n", "public"), (OTHER_ATTRIBUTES, "public")],
+    ids=["the same", "parts are gone", "attributes do something else"],
+)
 def test_a_newer_numba_is_tried(tmp_path, shim, way):
     done = run(tmp_path, shim + "from integrators.kernel.native import jit; print(jit._way.__name__)")
     assert done.returncode == 0, done.stderr
