@@ -242,32 +242,36 @@ class Steps(Writer):
     def sizes(self) -> None:
         """Set what a change of the values is: that of the stages which follows from it, beside their block.
 
-        The size of a block is the largest at the start of the step and, about, at its end.
+        The size of a block is the largest at the start of the step and, about, at its end. Where every row is
+        a block and the step size fixed, floored sizes are at least how far a row of the group moves, as
+        in `integrators.kernel.step.size.take_sizes`.
         """
         self.invert_sizes(self.form.groups, lambda d, _: self.extent(d))
 
     def sizes_of_vectors(self) -> None:
         """Set the same of tangent vectors, which are also as large as the newest values move the stages."""
 
-        def own(d: Index, weight: Value) -> Value:
+        def own(d: Index, weight: Value) -> tuple[Value, Value]:
             last = self.get(self.values, self.at(self.form.k - 1, self.form.rows, d))
-            return self.extent(d).max((weight * last).absolute())
+            size, moved = self.extent(d)
+            return size.max((weight * last).absolute()), moved
 
         self.invert_sizes(self.form.vectors, own)
 
-    def extent(self, d: Index) -> Value:
-        """Return the size of a component at the start of the step and, about, at its end."""
+    def extent(self, d: Index) -> tuple[Value, Value]:
+        """Return the size of a component at the start and, about, at the end of a step; and its movement."""
         y = self.get(self.state, d)
         if self.form.second:
             moved, _ = self.drift(d, self.h * self.get(self.velocity, d))
         else:
             moved = self.h * self.get(self.values, self.at(self.form.k - 1, self.form.rows, d))
-        return y.absolute().max((y + moved).absolute())
+        return y.absolute().max((y + moved).absolute()), moved.absolute()
 
-    def invert_sizes(self, groups: Blocks, own: Callable[[Index, Value], Value]) -> None:
-        """Write the weights of changes in groups of blocks, by ``own(d, weight)``, the size of a component.
+    def invert_sizes(self, groups: Blocks, own: Callable[[Index, Value], tuple[Value, Value]]) -> None:
+        """Write the weights of changes in groups of blocks, by ``own(d, weight)``.
 
-        The weight turns a change of the values into one of the stages.
+        That is the size of a component, and how far it moves. The weight turns a change of the values into
+        one of the stages.
         """
         from integrators.kernel.step.size import inverse_sizes, least_part  # imports numba
 
@@ -279,23 +283,26 @@ class Steps(Writer):
             return reach if form.unit else self.get(self.factor, d).absolute() * reach
 
         for first, blocks, width in groups:
-            largest = self.variable(self.kind, self.zero.value)
+            tops = largest, farthest = [self.variable(self.kind, self.zero.value) for _ in range(2)]
 
-            def measure(block: Index, first: int = first, width: int = width, largest: Any = largest) -> None:
+            def measure(block: Index, first: int = first, width: int = width, tops: Any = tops) -> None:
                 start = self.at(block, width, first)
                 size = self.zero
                 for i in range(width):
                     d = self.at(start, 1, i)
-                    size = size.max(own(d, weight_of(d)))
+                    extent, moved = own(d, weight_of(d))
+                    size = size.max(extent)
+                    if width == 1 and not form.varying:
+                        self.b.store(self.load(tops[1]).max(moved).value, tops[1])
                 self.put(size, self.size, start)
-                self.b.store(Value(self.b, self.b.load(largest)).max(size).value, largest)
+                self.b.store(self.load(tops[0]).max(size).value, tops[0])
 
             self.each(blocks, measure)
+            tops = self.load(largest), self.load(farthest)
 
-            def invert(block: Index, first: int = first, width: int = width, largest: Any = largest) -> None:
+            def invert(block: Index, first: int = first, width: int = width, tops: Any = tops) -> None:
                 start = self.at(block, width, first)
-                top = Value(self.b, self.b.load(largest))
-                inverses = inverse_sizes(self.get(self.size, start), top, least, self.zero, self.zero)
+                inverses = inverse_sizes(self.get(self.size, start), tops[0], least, self.zero, tops[1])
                 for i in range(width):
                     d = self.at(start, 1, i)
                     weight = weight_of(d)
