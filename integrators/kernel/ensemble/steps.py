@@ -10,6 +10,7 @@ in a lane depends on nothing in the others.
 """
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass
 from typing import Any
 
@@ -34,6 +35,7 @@ from problems.systems.base import System
 INFINITY = float("inf")
 UNROLLED = 640  # products of a sweep up to which stages and rows are written out
 ABREAST = 2  # rows of a product side by side: their sums stay in registers, and share its matrix
+MOST_BRANCHED = 16  # lanes up to which a branch for all that are decided pays: with 32 it costs 4 % (Morse)
 
 
 Blocks = tuple[tuple[int, int, int], ...]
@@ -240,32 +242,36 @@ class Steps(Writer):
     def sizes(self) -> None:
         """Set what a change of the values is: that of the stages which follows from it, beside their block.
 
-        The size of a block is the largest at the start of the step and, about, at its end.
+        The size of a block is the largest at the start of the step and, about, at its end. Where every row is
+        a block and the step size fixed, floored sizes are at least how far a row of the group moves, as
+        in `integrators.kernel.step.size.take_sizes`.
         """
         self.invert_sizes(self.form.groups, lambda d, _: self.extent(d))
 
     def sizes_of_vectors(self) -> None:
         """Set the same of tangent vectors, which are also as large as the newest values move the stages."""
 
-        def own(d: Index, weight: Value) -> Value:
+        def own(d: Index, weight: Value) -> tuple[Value, Value]:
             last = self.get(self.values, self.at(self.form.k - 1, self.form.rows, d))
-            return self.extent(d).max((weight * last).absolute())
+            size, moved = self.extent(d)
+            return size.max((weight * last).absolute()), moved
 
         self.invert_sizes(self.form.vectors, own)
 
-    def extent(self, d: Index) -> Value:
-        """Return the size of a component at the start of the step and, about, at its end."""
+    def extent(self, d: Index) -> tuple[Value, Value]:
+        """Return the size of a component at the start and, about, at the end of a step; and its movement."""
         y = self.get(self.state, d)
         if self.form.second:
             moved, _ = self.drift(d, self.h * self.get(self.velocity, d))
         else:
             moved = self.h * self.get(self.values, self.at(self.form.k - 1, self.form.rows, d))
-        return y.absolute().max((y + moved).absolute())
+        return y.absolute().max((y + moved).absolute()), moved.absolute()
 
-    def invert_sizes(self, groups: Blocks, own: Callable[[Index, Value], Value]) -> None:
-        """Write the weights of changes in groups of blocks, by ``own(d, weight)``, the size of a component.
+    def invert_sizes(self, groups: Blocks, own: Callable[[Index, Value], tuple[Value, Value]]) -> None:
+        """Write the weights of changes in groups of blocks, by ``own(d, weight)``.
 
-        The weight turns a change of the values into one of the stages.
+        That is the size of a component, and how far it moves. The weight turns a change of the values into
+        one of the stages.
         """
         from integrators.kernel.step.size import inverse_sizes, least_part  # imports numba
 
@@ -277,23 +283,26 @@ class Steps(Writer):
             return reach if form.unit else self.get(self.factor, d).absolute() * reach
 
         for first, blocks, width in groups:
-            largest = self.variable(self.kind, self.zero.value)
+            tops = largest, farthest = [self.variable(self.kind, self.zero.value) for _ in range(2)]
 
-            def measure(block: Index, first: int = first, width: int = width, largest: Any = largest) -> None:
+            def measure(block: Index, first: int = first, width: int = width, tops: Any = tops) -> None:
                 start = self.at(block, width, first)
                 size = self.zero
                 for i in range(width):
                     d = self.at(start, 1, i)
-                    size = size.max(own(d, weight_of(d)))
+                    extent, moved = own(d, weight_of(d))
+                    size = size.max(extent)
+                    if width == 1 and not form.varying:
+                        self.b.store(self.load(tops[1]).max(moved).value, tops[1])
                 self.put(size, self.size, start)
-                self.b.store(Value(self.b, self.b.load(largest)).max(size).value, largest)
+                self.b.store(self.load(tops[0]).max(size).value, tops[0])
 
             self.each(blocks, measure)
+            tops = self.load(largest), self.load(farthest)
 
-            def invert(block: Index, first: int = first, width: int = width, largest: Any = largest) -> None:
+            def invert(block: Index, first: int = first, width: int = width, tops: Any = tops) -> None:
                 start = self.at(block, width, first)
-                top = Value(self.b, self.b.load(largest))
-                inverses = inverse_sizes(self.get(self.size, start), top, least, self.zero, self.zero)
+                inverses = inverse_sizes(self.get(self.size, start), tops[0], least, self.zero, tops[1])
                 for i in range(width):
                     d = self.at(start, 1, i)
                     weight = weight_of(d)
@@ -439,7 +448,26 @@ class Steps(Writer):
         self.each(k, stage)
 
     def rule(self) -> None:
-        """Apply the stopping rule, in every lane by itself.
+        """Count a sweep, and apply the stopping rule, in every lane by itself.
+
+        A lane is not judged any more once it is known how many sweeps are left. Where that is known of all,
+        the end of the iteration need not wait for the rule.
+        """
+        b, form = self.b, self.form
+        if form.vectors:
+            self.sizes_of_vectors()
+        tried = b.add(b.load(self.tried), ir.Constant(INTEGER, 1))
+        b.store(tried, self.tried)
+        active, sweeps, left = b.load(self.active), self.load(self.sweeps), self.load(self.left) - 1.0
+        b.store((sweeps + 1.0).where(active, sweeps).value, self.sweeps)
+        b.store(left.value, self.left)
+        undecided = b.and_(active, left.compare(">=", INFINITY))
+        with b.if_then(self.any(undecided)) if form.lanes <= MOST_BRANCHED else nullcontext():
+            self.judge(undecided, tried)
+        b.store(b.and_(b.load(self.active), self.load(self.left).compare(">", 0.0)), self.active)
+
+    def judge(self, undecided: Any, tried: Any) -> None:
+        """Let lanes know how many sweeps are left, where that has become known, and end those that fail.
 
         What is judged is the change that the next sweep would make of the stages, beside
         their block: bounded by that of the values.
@@ -447,45 +475,29 @@ class Steps(Writer):
         from integrators.kernel.step.stopping import further, judge, left_over, stagnates  # imports numba
 
         b, form = self.b, self.form
-        if form.vectors:
-            self.sizes_of_vectors()
         change, floored = (self.variable(self.kind, self.zero.value) for _ in range(2))
 
         def largest(d: Index) -> None:
             moved = self.get(self.moved, d)
             for scales, top in ((self.strict, change), (self.floored, floored)):
                 size = (moved * self.get(scales, d)).absolute()
-                b.store(Value(b, b.load(top)).larger(size).value, top)
+                b.store(self.load(top).larger(size).value, top)
 
         self.each_row(largest)
-
-        def load(variable: Any) -> Value:
-            return Value(b, b.load(variable))
-
-        strict, best, rate, left = load(change), load(self.best), load(self.rate), load(self.left)
-        tried = b.add(b.load(self.tried), ir.Constant(INTEGER, 1))
-        b.store(tried, self.tried)
-        active = b.load(self.active)
-        sweeps = load(self.sweeps)
-        b.store((sweeps + 1.0).where(active, sweeps).value, self.sweeps)
-
+        strict, best, rate = self.load(change), self.load(self.best), self.load(self.rate)
         count = Value(b, splat(b, b.sitofp(tried, DOUBLE), form.lanes))
         best, stalled, rate, converged, rest = judge(
-            strict, load(self.last), best, load(self.stalled), rate, count, TOLERANCE, 0.0
+            strict, self.load(self.last), best, self.load(self.stalled), rate, count, TOLERANCE, 0.0
         )
-        over = converged | stagnates(load(floored), stalled)
+        over = converged | stagnates(self.load(floored), stalled)
         log_rest = LOG_REST_VARYING if form.varying else LOG_REST
         more = where(over, further(left_over(converged, rest, best), rate, log_rest), INFINITY)
-        undecided = left >= INFINITY
-        left = where(undecided, more, left - 1.0)
-        finite = strict < INFINITY
-        solved = ((left <= 0.0) & finite).value
-        rate = where(undecided, rate, load(self.rate)).where(active, load(self.rate))
+        left = more.where(undecided, self.load(self.left))
         news = (
             (self.last, strict),
             (self.best, best),
             (self.stalled, stalled),
-            (self.rate, rate),
+            (self.rate, rate.where(undecided, self.load(self.rate))),
             (self.left, left),
         )
         for variable, value in news:
@@ -493,14 +505,11 @@ class Steps(Writer):
 
         ends = (MOST_IN_LANES,) if form.varying else (MOST_IN_LANES, 2 * MOST_IN_LANES)
         over = [b.icmp_signed("==", tried, ir.Constant(INTEGER, n)) for n in ends]
-        all_of_them, none = (ir.Constant(active.type, [bit] * form.lanes) for bit in (1, 0))
-        late = [b.select(flag, all_of_them, none) for flag in over]
-        gives_up = b.not_(finite.value)
-        for mask in late:
-            gives_up = b.or_(gives_up, mask)
-        failing = b.and_(b.and_(active, b.not_(solved)), gives_up)
-        active = b.and_(active, b.not_(solved))
-        b.store(active, self.active)
+        all_of_them, none = (ir.Constant(undecided.type, [bit] * form.lanes) for bit in (1, 0))
+        gives_up = b.not_((strict < INFINITY).value)
+        for flag in over:
+            gives_up = b.or_(gives_up, b.select(flag, all_of_them, none))
+        failing = b.and_(b.and_(undecided, left.compare(">=", INFINITY)), gives_up)
         with b.if_then(self.any(failing), likely=False):
             self.restart(failing)
 

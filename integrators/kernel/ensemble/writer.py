@@ -67,6 +67,10 @@ class Writer:
         self.b.store(value, memory)
         return memory
 
+    def load(self, variable: Any) -> Value:
+        """Load a variable that is a row."""
+        return Value(self.b, self.b.load(variable))
+
     def place(self, base: Any, index: Index, kind: Any) -> Any:
         """Return the address of item ``index`` of an array of ``kind``."""
         index = ir.Constant(INTEGER, index) if isinstance(index, int) else index

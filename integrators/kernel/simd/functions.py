@@ -6,7 +6,9 @@ over a million arguments, in units in the last place, asserted in the tests:
 sin and cos 0.77, log 0.84, exp 0.97; tan, the quotient of sine and cosine, 2.1.
 sin and tan are odd and cos is even to the last bit. Where a lane of sin, cos or
 tan lies beyond 1e5 in size, all lanes of that call go one after another through
-the C library.
+the C library. An exponential that may be 0, subnormal or infinite takes a longer
+way; any other one adds to the exponent of a number about 1 (Morse's oscillator in
+lanes: 8 to 10 % less time, a Toda lattice: 24 %).
 
 A sine of eight lanes takes 4 ns, where eight of the C library take 45 ns: a
 pendulum's sweep over eight stages 28 ns instead of 70, a double pendulum's 44
@@ -26,6 +28,7 @@ from integrators.kernel.simd.values import Value
 SHIFT = 6755399441055744.0
 SHIFT_BITS = 0x4338000000000000
 LIMIT = 1e5
+MOST_ORDINARY = 708.0  # exp of a number beyond may be 0, subnormal or infinite
 
 # pi/2 in three parts; the first two have 53 bits each.
 HALF_PI = (1.5707963267948966, 6.123233995736766e-17, -1.4973849048591833e-33)
@@ -94,19 +97,31 @@ def _tan(x: Value) -> Value:
     return _quarter(x, sine, cosine, quadrant, 0) / _quarter(x, sine, cosine, quadrant, 1)
 
 
+def _exp_of_rest(x: Value) -> tuple[Value, Any]:
+    """Return exp of x less the nearest multiple n of log(2), and n as integers beyond those of `SHIFT`."""
+    shifted = x.fma(1.0 / math.log(2.0), SHIFT)
+    n = -(shifted - SHIFT)
+    whole = n.fma(LN2[0], x)
+    r = n.fma(LN2[1], whole)
+    series = r.polynomial([1.0 / math.factorial(i) for i in range(2, 14)])
+    return (r * r).fma(series, r) + 1.0, shifted.integers()
+
+
 def _exp(x: Value) -> Value:
+    value, shifted = _exp_of_rest(x)
+    b = x.builder
+    # The lowest twelve bits are n's, which is added to the exponent.
+    return x.doubles(b.add(value.integers(), b.shl(shifted, x.whole(52))))
+
+
+def _exp_far(x: Value) -> Value:
     b = x.builder
     # Beyond these the result is 0 or infinite anyhow.
     y = x.constant(-746.0).where(x.compare("<", -746.0), x)
     y = x.constant(710.0).where(x.compare(">", 710.0), y)
-    shifted = y.fma(1.0 / math.log(2.0), SHIFT)
-    n = -(shifted - SHIFT)
-    whole = n.fma(LN2[0], y)
-    r = n.fma(LN2[1], whole)
-    series = r.polynomial([1.0 / math.factorial(i) for i in range(2, 14)])
-    value = (r * r).fma(series, r) + 1.0
+    value, shifted = _exp_of_rest(y)
     # 2^n in two factors, since n reaches from -1075 to 1024.
-    power = b.sub(shifted.integers(), x.whole(SHIFT_BITS))
+    power = b.sub(shifted, x.whole(SHIFT_BITS))
     half = b.ashr(power, x.whole(1))
     for part in (half, b.sub(power, half)):
         value = value * x.doubles(b.shl(b.add(part, x.whole(1023)), x.whole(52)))
@@ -135,8 +150,34 @@ def _log(x: Value) -> Value:
     return x.where(x.compare("==", math.inf), value)
 
 
-def _function(name: str, formula: Any, limit: float | None) -> Any:
-    """Emit calls of a function that evaluates ``formula``, or the C library in lanes beyond ``limit``."""
+def _beyond(x: Value, limit: float) -> Any:
+    """Return the lanes that are larger in size than the limit, or no numbers."""
+    return x.builder.fcmp_unordered(">", x.absolute().value, x.constant(limit).value)
+
+
+def _library(name: str) -> Any:
+    """Return what calls the C library's function for one lane after another."""
+    return lambda x: Value(x.builder, llvm_call(x.builder, name, x.value))
+
+
+def _far(module: Any, name: str, kind: Any, limit: float, formula: Any) -> Any:
+    """Return the function of x and of values of it that has those of a formula where x is beyond the limit.
+
+    What comes out in a lane depends on no other lane. The code is long, and rarely needed: it is not to be
+    inlined wherever the function is.
+    """
+    function = ir.Function(module, ir.FunctionType(kind, [kind] * 2), f"lanes.{name}.far.{kind.count}")
+    function.linkage = "linkonce_odr"
+    for attribute in ("noinline", "cold"):
+        function.attributes.add(attribute)
+    b: Any = ir.IRBuilder(function.append_basic_block())
+    x, value = (Value(b, argument) for argument in function.args)
+    b.ret(formula(x).where(_beyond(x, limit), value).value)
+    return function
+
+
+def _function(name: str, formula: Any, limit: float | None, far: Any = None) -> Any:
+    """Emit calls of a function that evaluates ``formula``, or another one in lanes beyond ``limit``."""
 
     def emit(builder: Any, x: Any) -> Any:
         kind = x.type
@@ -149,24 +190,22 @@ def _function(name: str, formula: Any, limit: float | None) -> Any:
             argument = Value(inner, function.args[0])
             value = formula(argument)
             if limit is not None:
-                mask = inner.fcmp_unordered(">", argument.absolute().value, argument.constant(limit).value)
-                bits: Any = inner.bitcast(mask, ir.IntType(kind.count))
-                far = inner.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
-                with inner.if_then(far, likely=False):
-                    # in these alone: what comes out in a lane depends on no other lane
-                    library = Value(inner, llvm_call(inner, name, argument.value))
-                    inner.ret(library.where(mask, value).value)
+                bits: Any = inner.bitcast(_beyond(argument, limit), ir.IntType(kind.count))
+                some = inner.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
+                with inner.if_then(some, likely=False):
+                    others = _far(builder.module, name, kind, limit, far)
+                    inner.ret(inner.call(others, [argument.value, value.value]))
             inner.ret(value.value)
         return builder.call(function, [x])
 
     return emit
 
 
-for _math, _name, _formula, _limit in (
-    (math.sin, "sin", _sin, LIMIT),
-    (math.cos, "cos", _cos, LIMIT),
-    (math.tan, "tan", _tan, LIMIT),
-    (math.exp, "exp", _exp, None),
-    (math.log, "log", _log, None),
+for _math, _name, _formula, _limit, _other in (
+    (math.sin, "sin", _sin, LIMIT, _library("sin")),
+    (math.cos, "cos", _cos, LIMIT, _library("cos")),
+    (math.tan, "tan", _tan, LIMIT, _library("tan")),
+    (math.exp, "exp", _exp, MOST_ORDINARY, _exp_far),
+    (math.log, "log", _log, None, None),
 ):
-    register(_math, 1, Lanes, _function(_name, _formula, _limit))
+    register(_math, 1, Lanes, _function(_name, _formula, _limit, _other))

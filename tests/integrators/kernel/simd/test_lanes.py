@@ -226,3 +226,15 @@ def test_one_lane_far_out_takes_the_whole_call_to_the_c_library(compiled, count)
     found = compiled["functions"](x, np.ones(count), np.ones(count))
     assert np.allclose(found[0], np.sin(x), rtol=1e-15, atol=0)
     assert found[0][3] == math.sin(1e22)
+
+
+@pytest.mark.parametrize("far", [708.5, 1000.0, -708.5, -740.0, -1000.0, np.inf, np.nan])
+def test_one_exponential_far_out_is_right_and_leaves_the_others_their_bits(compiled, count, far):
+    one = np.ones(count)
+    x = np.random.default_rng(3).uniform(-700, 700, count)
+    before = compiled["functions"](one, x, one)[3]
+    x[3] = far
+    found = compiled["functions"](one, x, one)[3]
+    assert np.array_equal(np.delete(found, 3), np.delete(before, 3))
+    with np.errstate(all="ignore"):
+        assert np.allclose(found[3], np.exp(far), rtol=3e-16, atol=5e-324, equal_nan=True)  # 1 ulp at most
