@@ -154,7 +154,7 @@ class AdaptiveStepper(HBVMStepper):
                 controller.interval, abs(self._goal - self._origin), abs(end - self._origin)
             )
             self._program.limit(ctx, controller.interval)
-        way = end - self.t
+        way = (self._goal if end == self.t else end) - self.t
         if way == 0.0 or not math.copysign(1.0, way) * ctx.controller.next_length < 0.0:
             return
         ctx.controller.next_length *= -1.0
