@@ -27,6 +27,7 @@ from integrators.protocol import Array, Samples, Status
 from integrators.refusals import one_thread
 from integrators.running.watchdog import stall_detector
 
+LATEST = sys.float_info.max  # a time beyond all
 LOOK_AHEAD = 2000  # steps of the look ahead, at most
 MOST_COMPARED = 20000  # of each of the trajectories that tell how errors grow: longer ones tell nothing
 LARGER = 1e3  # times as large as a block is, at least, what it will reach is worth knowing
@@ -82,18 +83,19 @@ class AdaptiveStepper(HBVMStepper):
     def _one_step(self) -> bool:
         if self._breakpoints.size or self._max_steps is not None:
             return False
-        (ends, _, place, out), ctx = self._room, self._context
-        ends[0] = math.copysign(sys.float_info.max, ctx.controller.next_length)
-        return self._is_one(
-            self._enter(engine.TAKE, ctx.address, self._partial.address, PARTIAL, 2, place, 0, 0, 0, out, 1),
-            BUDGET,
-        )
+        ends, call, _ = self._for_one_step
+        ends[0] = LATEST if self._context.controller.next_length > 0.0 else -LATEST
+        return self._is_one(self._enter(*call), BUDGET)
+
+    def _one_step_call(self, numbers: int, out: int) -> tuple[int, ...]:
+        own, partial = self._context.address, self._partial.address
+        return engine.TAKE, own, partial, PARTIAL, 2, numbers, 0, 0, 0, out, 1
 
     @one_thread
     def take(self, count: int) -> Samples:
         """Take ``count`` steps and return them."""
         ahead = self._context.controller.next_length > 0.0
-        return self.take_steps(sys.float_info.max if ahead else -sys.float_info.max, limit=count)
+        return self.take_steps(LATEST if ahead else -LATEST, limit=count)
 
     def march(self, end: float, most: int) -> Samples:
         """Take steps, ``most`` at most and none beyond the time ``end``; return them."""
@@ -150,7 +152,7 @@ class AdaptiveStepper(HBVMStepper):
     def _face(self, end: float) -> None:
         """Turn towards a time; what lay ahead is forgotten where it lies behind then."""
         ctx = self._context
-        if abs(end) < sys.float_info.max:
+        if abs(end) < LATEST:
             self._goal = end if self.destination is None else self.destination
             controller = ctx.controller.numbers
             controller.interval = max(

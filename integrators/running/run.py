@@ -169,21 +169,24 @@ class Run:
         return found
 
     @property
-    def _present(self) -> tuple[float, Array]:
-        """The time and the state: after a terminal event its own, which lies within a step."""
-        if self.status is Status.EVENT:
+    def _apart(self) -> tuple[float, Array] | None:
+        """The present time and state where they lie within a step: asked for, or of a terminal event."""
+        if self._wanted and self.status is Status.EVENT:
             return self._stepper.search.hits.last()
-        return self._shown or (self._stepper.t, self._stepper.y)
+        return self._shown
 
     @property
     def t(self) -> float:
         """The current time; after a terminal event its time."""
-        return self._present[0]
+        apart = self._apart
+        return self._stepper.t if apart is None else apart[0]
 
     @property
     def y(self) -> Array:
         """The current state, shape (dim,), q then p; it can be set as a whole."""
-        return _frozen(self._present[1], "y = run.y.copy(), then run.y = y")
+        apart = self._apart
+        state = self._stepper.y if apart is None else apart[1]
+        return _frozen(state, "y = run.y.copy(), then run.y = y")
 
     @y.setter
     def y(self, state: ArrayLike) -> None:
@@ -292,10 +295,11 @@ class Run:
 
         After `until` it is the remainder of the step that contains that time.
         """
-        if self.status is Status.RUNNING:
-            self._stepper.step()
+        status = self.status
+        if status is Status.RUNNING:
             self._shown = None
-        return self.status
+            status = self._stepper.step()
+        return self.status if self._wanted else status
 
     def until(self, t: float) -> Array:
         """Integrate to a time, forward or backward, and return the state there.
