@@ -67,9 +67,10 @@ class FixedStepper(HBVMStepper):
         return self._steps(self._context.n + 1, end, most)
 
     def _advance(self, grid: Array, sample: str) -> Samples:
-        goal = self.destination if self.destination is not None and grid[-1] == self.t else grid[-1]
-        if (goal - self.t) * self._context.h < 0.0:  # steps are counted from here
-            self._turn(self.t)
+        t = self.t
+        goal = self.destination if self.destination is not None and grid[-1] == t else grid[-1]
+        if (goal - t) * self._context.h < 0.0:  # steps are counted from here
+            self._turn(t)
         if sample == "steps":
             return self._steps(self._context.n + int(grid[0] != self.t), float(grid[-1]))
         return self._to(grid, {"stop": STOP, "dense": DENSE}.get(sample, PARTIAL))

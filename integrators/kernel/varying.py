@@ -65,11 +65,12 @@ class AdaptiveStepper(HBVMStepper):
         self._origin = self._goal = t0
         self._in_vain = 1
         super().__init__(program, y, par, t0)
-        self._begin_at_breakpoint()
+        if self._breakpoints.size:
+            self._begin_at_breakpoint()
 
     def _begin_at_breakpoint(self) -> None:
         """Let the step ahead begin with the values beyond a breakpoint, if one is here."""
-        if self._breakpoints.size and any(map(self._is_at, self._breakpoints.tolist())):
+        if any(map(self._is_at, self._breakpoints.tolist())):
             self._context.kinks.border = START
 
     def _extra(self) -> dict[str, Any]:
