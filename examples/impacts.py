@@ -32,12 +32,14 @@ def exact() -> np.ndarray:
         x = radius - FRICTION
 
 
+WALL_HIT = integrators.Event(  # made once, as heyoka's integrator
+    lambda y: y[0] - WALL, direction=-1, then=lambda y: [WALL, -KEPT * y[1]], name="wall"
+)
+
+
 def by_event(problem: problems.Problem) -> np.ndarray:
     """Return the times of impacts, each an event whose action turns the speed around."""
-    wall = integrators.Event(
-        lambda y: y[0] - WALL, direction=-1, then=lambda y: [WALL, -KEPT * y[1]], name="wall"
-    )
-    return integrators.integrate(problem, integrators.HBVM(), [END], events=wall).events["wall"].t
+    return integrators.integrate(problem, integrators.HBVM(), [END], events=WALL_HIT).events["wall"].t
 
 
 @cache  # made once, as its users do

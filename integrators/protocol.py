@@ -146,7 +146,10 @@ class Status(StrEnum):
     @property
     def failed(self) -> bool:
         """Whether the integration ended before the requested time."""
-        return self not in (Status.RUNNING, Status.FINISHED, Status.EVENT)
+        return self not in _NO_FAILURES
+
+
+_NO_FAILURES = (Status.RUNNING, Status.FINISHED, Status.EVENT)  # looked up once, and not in each step
 
 
 class UserError(Exception):

@@ -66,6 +66,12 @@ class Occurrences:
     def __len__(self) -> int:
         return self.t.size
 
+    def select(self, which: NDArray[Any]) -> "Occurrences":
+        """Return some of them, by a mask or indices."""
+        after = None if self.after is None else self.after[which]
+        par = None if self.par is None else self.par[which]
+        return Occurrences(self.t[which], self.y[which], self.direction[which], after, par)
+
 
 @readable
 @dataclass(frozen=True, eq=False, repr=False)

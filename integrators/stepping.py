@@ -171,6 +171,8 @@ class StepperBase:
             t, y = np.concatenate([t, more[0]]), np.concatenate([y, more[1]])
             if t.size:
                 t, y = self._reached(t, y)
+        elif self.destination is not None and self.destination < self._t:
+            self._towards(self.destination)  # `step` goes forward otherwise
         status = Status.FINISHED if self._status is Status.RUNNING else self._status
         return Samples(t, y, status, self._reason)
 
@@ -218,6 +220,9 @@ class StepperBase:
         if math.isfinite(t) and are_finite(y):
             self._arrive(t, y)
         self._status, self._reason = status, reason
+
+    def _towards(self, end: float) -> float | None:
+        """Turn round where ``end`` lies on the other side of the present; a subclass may return the sign."""
 
     def _serve(self, grid: Array, how: str) -> tuple[Array, Array]:
         """Return a leading part of ``grid`` (all of it ahead of the present) and the states there.

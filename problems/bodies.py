@@ -16,7 +16,7 @@ from problems.problem import Problem
 from problems.systems.base import System
 from problems.systems.vector_field import VectorField
 
-__all__ = ["J2", "PostNewtonian", "nbody"]
+__all__ = ["J2", "PostNewtonian", "bodies_of", "nbody"]
 
 Array = NDArray[np.float64]
 SWEEPS = 100  # of the iteration for momenta from velocities
@@ -239,9 +239,9 @@ def nbody(
     >>> bool(integrate(orbit, HBVM()).errors()["energy"].max() < 1e-14)
     True
     """
-    mass, n = _masses(masses), np.size(masses)
+    mass, n = masses_of(masses), np.size(masses)
     x, v = (
-        _rows(label, given, n + massless)
+        rows_of(label, given, n + massless)
         for label, given in (("positions", positions), ("velocities", velocities))
     )
     for a in range(n + massless):
@@ -353,7 +353,56 @@ def _momenta(system: System, t: float, q: Array, v: Array, masses: Array) -> Arr
     return p
 
 
-def _masses(masses: ArrayLike) -> Array:
+@checked_arguments
+def bodies_of(
+    problem: Problem, y: ArrayLike | None = None, t: float | None = None
+) -> tuple[Array, Array, Array]:
+    """Return masses, positions and velocities of the bodies of a problem, such as `nbody` returns.
+
+    Parameters
+    ----------
+    problem : Problem
+        A problem of bodies in space.
+    y : array_like, shape (dim,), optional
+        A state, such as ``solution.y[-1]``; by default the start.
+    t : float, optional
+        Its time; by default ``problem.t0``.
+
+    Returns
+    -------
+    masses : ndarray, shape (m,)
+        The parameter ``m``; other bodies are massless.
+    positions, velocities : ndarray, shape (n, 3)
+
+    Raises
+    ------
+    problems.errors.InputError
+        For a problem without bodies in space, and a state of another shape.
+
+    Examples
+    --------
+    >>> from problems import nbody
+    >>> from problems.bodies import bodies_of
+    >>> pair = nbody([4.0, 2.0], [[0, 0, 0], [1, 0, 0]], [[0, 0, 0], [0, 0.5, 0]], t_end=1.0)
+    >>> masses, x, v = bodies_of(pair)
+    >>> masses.tolist(), v[1].tolist()
+    ([4.0, 2.0], [0.0, 0.5, 0.0])
+    """
+    system, values = problem.system, problem.system.unpack(problem.par)
+    n, masses = system.dim // 6, np.atleast_1d(np.array(values.get("m", []), dtype=np.float64))
+    if system.dim % 6 or not 0 < masses.size <= n or (system.dof is not None and masses.size != n):
+        raise InputError(f"{problem!s} has no bodies in space; make it with problems.nbody.")
+    state = problem.y0 if y is None else np.array(y, dtype=np.float64)
+    if state.shape != (system.dim,):
+        raise InputError(f"y={shown(y)} must be a state of {system.name}, {system.dim} numbers.")
+    half, v = 3 * n, state[3 * n :]
+    if system.dof is not None:
+        v = emit.numpy(system, "field")(problem.t0 if t is None else t, state, problem.par)[:half]
+    return masses, state[:half].reshape(n, 3).copy(), v.reshape(n, 3).copy()
+
+
+def masses_of(masses: ArrayLike) -> Array:
+    """Return a copy of masses that are checked."""
     try:
         values = np.array(masses, dtype=np.float64)
     except (TypeError, ValueError):
@@ -366,7 +415,8 @@ def _masses(masses: ArrayLike) -> Array:
     return values
 
 
-def _rows(label: str, rows: ArrayLike, n: int) -> Array:
+def rows_of(label: str, rows: ArrayLike, n: int) -> Array:
+    """Return a copy of three numbers for each of n bodies, which are checked."""
     try:
         values = np.array(rows, dtype=np.float64)
     except (TypeError, ValueError):

@@ -52,7 +52,7 @@ class Event(CheckedOptions):
         True: the integration ends at the first occurrence; a number n: at the n-th.
     then : callable, optional
         Action of the event: a function of the same arguments that returns the new state, a list of dim
-        numbers (q then p), such as a bounce, a kick or a merger. To change parameters it returns a tuple
+        numbers (q then p), such as a bounce or a kick. To change parameters it returns a tuple
         ``(state, {"name": value, ...})``, with ``None`` for an unchanged state. It is traced once and
         compiled, or else called with numbers, which takes some 30 µs. The integration continues from the new
         state; fixed steps are counted from there. For `HBVM` and `Gauss`.

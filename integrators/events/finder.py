@@ -164,6 +164,18 @@ class Finder(Protocol):
         """Go on from where `save` was called."""
         ...
 
+    def resume(self, counts: Sequence[int], directions: Sequence[int]) -> None:
+        """Go on at the start as after a turn: events have happened, and those that are at the start do again.
+
+        Parameters
+        ----------
+        counts : sequence of int
+            How often each event has happened.
+        directions : sequence of int
+            How its function has just changed its sign at the start; 0: it has not, or has only touched zero.
+        """
+        ...
+
 
 @dataclass(frozen=True)
 class Ending:

@@ -45,15 +45,14 @@ class FixedStepper(HBVMStepper):
         return self._samples(times[: len(states)], states, outcome, why)
 
     def _one_step(self) -> bool:
-        (numbers, _, place, out), ctx = self._room, self._context
-        target = numbers.view(np.int64)[:1]
-        target[0] = ctx.n + 1
-        # its time and the part of a step beyond it are of no account: 0.0
-        own, partial = ctx.address, self._partial.address
-        outcome = self._enter(
-            engine.ADVANCE, own, partial, PARTIAL, 1, place + 8, place, place + 8, 0, out, 1
-        )
-        return self._is_one(outcome, DONE)
+        numbers, call, _ = self._for_one_step
+        numbers.view(np.int64)[0] = self._context.n + 1
+        return self._is_one(self._enter(*call), DONE)
+
+    def _one_step_call(self, numbers: int, out: int) -> tuple[int, ...]:
+        own, partial = self._context.address, self._partial.address
+        # The time and the part of a step beyond it are of no account: 0.0.
+        return engine.ADVANCE, own, partial, PARTIAL, 1, numbers + 8, numbers, numbers + 8, 0, out, 1
 
     @one_thread
     def take(self, count: int) -> Samples:
@@ -68,8 +67,10 @@ class FixedStepper(HBVMStepper):
         return self._steps(self._context.n + 1, end, most)
 
     def _advance(self, grid: Array, sample: str) -> Samples:
-        if (grid[-1] - self.t) * self._context.h < 0.0:  # steps are counted from here
-            self._turn(self.t)
+        t = self.t
+        goal = self.destination if self.destination is not None and grid[-1] == t else grid[-1]
+        if (goal - t) * self._context.h < 0.0:  # steps are counted from here
+            self._turn(t)
         if sample == "steps":
             return self._steps(self._context.n + int(grid[0] != self.t), float(grid[-1]))
         return self._to(grid, {"stop": STOP, "dense": DENSE}.get(sample, PARTIAL))

@@ -419,10 +419,14 @@ class HBVMStepper(ABC):
         return outcome != BUDGET
 
     @cached_property
-    def _room(self) -> tuple[Array, Array, int, int]:
-        """Two numbers and two states for the kernel to write to, and where they are."""
+    def _for_one_step(self) -> tuple[Array, tuple[Any, ...], Array]:
+        """Two numbers that one step reads, what the kernel is called with for it, and where it writes."""
         numbers, states = np.zeros(2), np.empty((2, self._dim))
-        return numbers, states, address(numbers), address(states)
+        return numbers, self._one_step_call(address(numbers), address(states)), states
+
+    @abstractmethod
+    def _one_step_call(self, numbers: int, out: int) -> tuple[int, ...]:
+        """Return what the kernel is called with for one step, with the addresses of numbers and of states."""
 
     @abstractmethod
     def take(self, count: int) -> Samples:

@@ -7,6 +7,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from integrators.kernel.context import (
+    ANEW,
     BUDGET,
     DENSE,
     DONE,
@@ -25,8 +26,8 @@ from integrators.options import SHORTEST, SMALLEST
 from integrators.protocol import Array, Samples, Status
 from integrators.refusals import one_thread
 from integrators.running.watchdog import stall_detector
-from problems.errors import InputError
 
+LATEST = sys.float_info.max  # a time beyond all
 LOOK_AHEAD = 2000  # steps of the look ahead, at most
 MOST_COMPARED = 20000  # of each of the trajectories that tell how errors grow: longer ones tell nothing
 LARGER = 1e3  # times as large as a block is, at least, what it will reach is worth knowing
@@ -64,7 +65,12 @@ class AdaptiveStepper(HBVMStepper):
         self._origin = self._goal = t0
         self._in_vain = 1
         super().__init__(program, y, par, t0)
-        if self._breakpoints.size and any(map(self._is_at, self._breakpoints.tolist())):
+        if self._breakpoints.size:
+            self._begin_at_breakpoint()
+
+    def _begin_at_breakpoint(self) -> None:
+        """Let the step ahead begin with the values beyond a breakpoint, if one is here."""
+        if any(map(self._is_at, self._breakpoints.tolist())):
             self._context.kinks.border = START
 
     def _extra(self) -> dict[str, Any]:
@@ -78,18 +84,19 @@ class AdaptiveStepper(HBVMStepper):
     def _one_step(self) -> bool:
         if self._breakpoints.size or self._max_steps is not None:
             return False
-        (ends, _, place, out), ctx = self._room, self._context
-        ends[0] = math.copysign(sys.float_info.max, ctx.controller.next_length)
-        return self._is_one(
-            self._enter(engine.TAKE, ctx.address, self._partial.address, PARTIAL, 2, place, 0, 0, 0, out, 1),
-            BUDGET,
-        )
+        ends, call, _ = self._for_one_step
+        ends[0] = LATEST if self._context.controller.next_length > 0.0 else -LATEST
+        return self._is_one(self._enter(*call), BUDGET)
+
+    def _one_step_call(self, numbers: int, out: int) -> tuple[int, ...]:
+        own, partial = self._context.address, self._partial.address
+        return engine.TAKE, own, partial, PARTIAL, 2, numbers, 0, 0, 0, out, 1
 
     @one_thread
     def take(self, count: int) -> Samples:
         """Take ``count`` steps and return them."""
         ahead = self._context.controller.next_length > 0.0
-        return self.take_steps(sys.float_info.max if ahead else -sys.float_info.max, limit=count)
+        return self.take_steps(LATEST if ahead else -LATEST, limit=count)
 
     def march(self, end: float, most: int) -> Samples:
         """Take steps, ``most`` at most and none beyond the time ``end``; return them."""
@@ -121,11 +128,10 @@ class AdaptiveStepper(HBVMStepper):
 
     def _renew(self, par: Array) -> None:
         super()._renew(par)
-        if not np.array_equal(self._program.breakpoints(par), self._breakpoints):
-            raise InputError(
-                f"an event at t = {self.t!r} changes parameters that the times at which "
-                f"{self._program.system.name} switches depend on; let it change none of these."
-            )
+        breakpoints = self._program.breakpoints(par)
+        if not np.array_equal(breakpoints, self._breakpoints):
+            self._breakpoints, controller = breakpoints, self._context.controller
+            controller.stop, controller.breaks = math.inf, 0
 
     def _restart(self, t: float) -> None:
         """Begin anew at a breakpoint: what is known from before it says nothing about what follows."""
@@ -147,14 +153,14 @@ class AdaptiveStepper(HBVMStepper):
     def _face(self, end: float) -> None:
         """Turn towards a time; what lay ahead is forgotten where it lies behind then."""
         ctx = self._context
-        if abs(end) < sys.float_info.max:
+        if abs(end) < LATEST:
             self._goal = end if self.destination is None else self.destination
             controller = ctx.controller.numbers
             controller.interval = max(
                 controller.interval, abs(self._goal - self._origin), abs(end - self._origin)
             )
             self._program.limit(ctx, controller.interval)
-        way = end - self.t
+        way = (self._goal if end == self.t else end) - self.t
         if way == 0.0 or not math.copysign(1.0, way) * ctx.controller.next_length < 0.0:
             return
         ctx.controller.next_length *= -1.0
@@ -171,12 +177,12 @@ class AdaptiveStepper(HBVMStepper):
     def _to(self, times: Array, between: int) -> Samples:
         """Make the samples, piece by piece from one breakpoint to the next."""
         self._watch = stall_detector(self, self.t, float(times[-1]))
-        if not self._breakpoints.size:
+        if not self._breakpoints.size and not self._context.events.act:
             states, outcome, why = self._fill(between, times)
             return self._samples(times[: len(states)], states, outcome, why)
         out = np.empty((times.size, self._dim))
-        count, outcome, why = 0, DONE, None
-        while count < times.size and outcome == DONE and why is None:
+        count, outcome, why = 0, ANEW, None
+        while count < times.size and outcome in (DONE, ANEW) and why is None:
             stop = self._stop()
             beyond = np.flatnonzero((times - stop) * self._context.controller.next_length > 0.0)
             last = int(beyond[0]) if beyond.size and beyond[0] >= count else times.size
@@ -192,7 +198,11 @@ class AdaptiveStepper(HBVMStepper):
         return self._samples(times[:count], out[:count], outcome, why)
 
     def _handled(self, outcome: int) -> int:
+        breakpoints = self._breakpoints
         outcome = super()._handled(outcome)
+        if self._breakpoints is not breakpoints:  # an event has moved them
+            self._begin_at_breakpoint()
+            return ANEW if outcome == BUDGET else outcome
         if outcome != UNSCALED:
             return outcome
         self._look_ahead()
@@ -346,6 +356,7 @@ class AdaptiveStepper(HBVMStepper):
             if self._vectors:
                 self._vectors.room(n + 1)
             outcome = self._call(engine.TAKE, PARTIAL, times, out, 0, n)
+            outcome = BUDGET if outcome == ANEW else outcome
             count = self._context.samples_written
             steps += count
             pieces.append((times[:count], out[:count]))

@@ -19,6 +19,8 @@ from problems.checks import checked_arguments
 from problems.errors import InputError
 from problems.problem import Problem
 
+CLOSE = 64  # units in the last place: nothing happens in a time as short
+
 
 @checked_arguments
 def start(
@@ -96,9 +98,11 @@ class Run:
         self._par = problem.par
         self._acts = any(event.then is not None for event in self._wanted.values())
         self._before: list[Mapping[str, Occurrences]] = []
+        self._since = 0  # terminal events count what happens from here on in that list
         self._shown: tuple[float, Array] | None = None
         self._terminates = any(event.last for event in self._wanted.values())
         self._over = False  # whether a terminal event has happened in the step ahead
+        self._way = 1.0 if problem.t_end >= problem.t0 else -1.0
         digits = start is not None or method.precision != "double"
         if digits:
             check_digits(method, events=bool(self._wanted), variations=False)
@@ -108,39 +112,81 @@ class Run:
     def _begin(self, y: Array, t: float) -> None:
         """Begin at a state, or at its pairs."""
         if y.ndim == 2:
-            self._stepper = cast("DoubleDouble", self._program).start_pairs(y, self._par, t)
-            return
-        last = self.problem.t_end
-        end = sys.float_info.max if last >= self.problem.t0 else -sys.float_info.max
-        self._stepper = started(self._program, self.method, self.problem, self._wanted, y, self._par, t, end)
+            self._stepper: Any = cast("DoubleDouble", self._program).start_pairs(y, self._par, t)
+        else:
+            self._stepper = started(
+                self._program, self.method, self.problem, self._wanted, y, self._par, t,
+                self._way * sys.float_info.max,
+            )  # fmt: skip
         if offers(self._stepper, Destination):  # how long an interval is says how long a first step may be
+            last = self.problem.t_end
+            if self._way * (last - t) <= 0.0:  # beyond it, or on the way back
+                last = t + self._way * (abs(last - t) or abs(last - self.problem.t0))
             self._stepper.destination = last
             self._stepper.advance(np.array([t]))
             self._stepper.destination = None
 
-    def _anew(self, y: Array, par: Array) -> None:
+    def _anew(self, y: Array, par: Array, *, turn: bool = False) -> None:
         t, self._par = self.t, par
         if self._wanted:
-            self._before.append(self._stepper.search.hits.occurrences())
+            self._before.append(self._happened())
+            self._since = len(self._before)
+        self._way *= -1.0 if turn else 1.0
         self._begin(y, t)
         self._shown, self._over = None, False
 
+    def _turn(self) -> None:
+        """Begin anew at the present, in the other direction.
+
+        The step ahead may contain events that have happened and others that have not. So the way back begins
+        here and not at the last step. An event that has happened at this very time happens again.
+        """
+        since, t = self._since, self.t
+        self._anew(self.y, self._now, turn=True)
+        self._since = since
+        counts, directions = [], []
+        for name in self._wanted:
+            parts = [part[name] for part in self._before[since:]]
+            counts.append(sum(map(len, parts)))
+            last = parts[-1]
+            here = len(last) and abs(last.t[-1] - t) <= _rounding(t)
+            directions.append(int(last.direction[-1]) if here else 0)
+        self._stepper.search.resume(counts, directions)
+
+    def _happened(self) -> dict[str, Occurrences]:
+        """Return the events since the method began anew: up to the present, which a step may contain."""
+        search, t = self._stepper.search, self.t
+        kept = None
+        if self._shown is not None and self.status is Status.RUNNING:
+            kept = search.save()
+            self._stepper.look_to(t)
+        found = {
+            name: hits.select(self._way * (hits.t - t) <= _rounding(t))
+            for name, hits in search.hits.occurrences().items()
+        }
+        if kept is not None and search.trouble is None:
+            search.load(kept)  # the step is looked at as a whole when it is taken
+        return found
+
     @property
-    def _present(self) -> tuple[float, Array]:
-        """The time and the state: after a terminal event its own, which lies within a step."""
-        if self.status is Status.EVENT:
+    def _apart(self) -> tuple[float, Array] | None:
+        """The present time and state where they lie within a step: asked for, or of a terminal event."""
+        if self._wanted and self.status is Status.EVENT:
             return self._stepper.search.hits.last()
-        return self._shown or (self._stepper.t, self._stepper.y)
+        return self._shown
 
     @property
     def t(self) -> float:
         """The current time; after a terminal event its time."""
-        return self._present[0]
+        apart = self._apart
+        return self._stepper.t if apart is None else apart[0]
 
     @property
     def y(self) -> Array:
         """The current state, shape (dim,), q then p; it can be set as a whole."""
-        return _frozen(self._present[1], "y = run.y.copy(), then run.y = y")
+        apart = self._apart
+        state = self._stepper.y if apart is None else apart[1]
+        return _frozen(state, "y = run.y.copy(), then run.y = y")
 
     @y.setter
     def y(self, state: ArrayLike) -> None:
@@ -211,19 +257,25 @@ class Run:
     @property
     def status(self) -> Status:
         """Status: ``RUNNING``, ``EVENT`` after a terminal event, or the kind of failure."""
-        return Status.EVENT if self._over else self._stepper.status
+        if self._over:
+            return Status.EVENT
+        trouble = self._stepper.search.trouble if self._wanted else None
+        return self._stepper.status if trouble is None else trouble[0]
 
     @property
     def reason(self) -> str:
         """One sentence on a failure or a terminal event; empty otherwise."""
-        return self._stepper.search.hits.reason if self._over else self._stepper.reason
+        if self._over:
+            return self._stepper.search.hits.reason
+        trouble = self._stepper.search.trouble if self._wanted else None
+        return self._stepper.reason if trouble is None else trouble[1]
 
     @property
     def events(self) -> dict[str, Occurrences]:
         """Occurrences of the events so far, by name."""
         if not self._wanted:
             return {}
-        parts = [*self._before, self._stepper.search.hits.occurrences()]
+        parts = [*self._before, self._happened()]
 
         def joined(name: str, key: str) -> Any:
             return np.concatenate([getattr(part[name], key) for part in parts])
@@ -243,17 +295,21 @@ class Run:
 
         After `until` it is the remainder of the step that contains that time.
         """
-        if self.status is Status.RUNNING:
-            self._stepper.step()
+        status = self.status
+        if status is Status.RUNNING:
             self._shown = None
-        return self.status
+            status = self._stepper.step()
+        return self.status if self._wanted else status
 
     def until(self, t: float) -> Array:
         """Integrate to a time, forward or backward, and return the state there.
 
         The method's steps do not depend on it: the state is that of `integrate` at this time, and the next
-        step ends where it would have ended without the call. If the method fails before, or a terminal event
-        happens, `status` and `reason` describe it, and the time and the state are those that were reached.
+        step ends where it would have ended without the call. With events this holds in one direction: on the
+        way back the method restarts at the present state, and events happen again.
+
+        If the method fails before, or a terminal event happens, `status` and `reason` describe it, and the
+        time and the state are those that were reached.
 
         Parameters
         ----------
@@ -271,6 +327,11 @@ class Run:
         """
         (goal,) = check_times([t], self.t).tolist()
         if self.status is Status.RUNNING and goal != self.t:
+            if (goal - (self.t if self._wanted else self._stepper.t)) * self._way < 0.0:
+                if self._wanted:
+                    self._turn()
+                else:  # the stepper does so itself
+                    self._way *= -1.0
             samples = self._stepper.advance(np.array([goal]))
             self._shown = (goal, samples.y[0]) if samples.t.size else None
             if self._terminates and self._stepper.status is Status.RUNNING:
@@ -302,6 +363,11 @@ class Run:
 
     def __repr__(self) -> str:
         return f"Run({self.problem!s}, {self.method!r}, {self.status} at t = {self.t!r})"
+
+
+def _rounding(t: float) -> float:
+    """Return the difference of times that rounding of the time ``t`` may account for."""
+    return CLOSE * float(np.spacing(abs(t)))
 
 
 class _Whole(np.ndarray):

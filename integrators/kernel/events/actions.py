@@ -11,11 +11,13 @@ from integrators.kernel.events.memory import GOING, RAISED, TERMINAL, TINY, UNDE
 from integrators.kernel.events.sample import NAN, function, is_finite, noise_of, sign, spread_state
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.memory import call_field, call_line, put, splat8
+from integrators.kernel.step.control import SHORTEST
 from integrators.kernel.step.sample import read, vectors_of_state
 
 SIMULTANEOUS = 2.0**-49  # times whose relative difference is at most this are the same
 RESIDUE = 4.0  # times the function's value at the zero that was found, its value after may be, and is still 0
-AHEAD = 2.0**-10  # of a step, to see where a function goes
+AHEAD = 2.0**-10  # of a step
+NOTED = 2  # `Search.due` of an event without an action that has happened at the same time
 
 
 @compiled
@@ -82,6 +84,8 @@ def end_step(ctx, search, before):
             else:
                 keep(search, i, kept)
                 kept += 1
+                if late >= -close:
+                    search.due[event] = NOTED
         search.hits = kept
     for i in range(before, search.hits):
         search.happened[search.hit_events[i]] += 1
@@ -145,7 +149,7 @@ def change_state(ctx, search):
         search.values_before[event] = function(ctx, search, search.time, search.step_state)
     halted = False
     for event in range(search.count):
-        if search.due[event] == 0:
+        if search.due[event] != 1:
             continue
         i = search.hits
         search.hit_times[i], search.hit_events[i] = search.time, event
@@ -171,9 +175,9 @@ def change_state(ctx, search):
 
 
 @compiled
-def length_ahead(ctx):
-    """Return about how long the step ahead is."""
-    return ctx.controller.next_length if ctx.varying else ctx.h
+def move_ahead(ctx, search):
+    """Return a small part of the step ahead, with the sign of its direction, to see where a function goes."""
+    return search.sign * (AHEAD * abs(ctx.controller.next_length if ctx.varying else ctx.h))
 
 
 @compiled
@@ -182,7 +186,7 @@ def set_state_ahead(ctx, search):
 
     It is there to see where functions go. Return whether it is finite.
     """
-    lanes, rows, values, move = ctx.lanes, ctx.rows, ctx.scratch.sums, AHEAD * length_ahead(ctx)
+    lanes, rows, values, move = ctx.lanes, ctx.rows, ctx.scratch.sums, move_ahead(ctx, search)
     for block in range(ctx.calls if ctx.line else 1):
         for lane in range(lanes):
             ctx.times[lanes * block + lane] = ctx.t0
@@ -208,9 +212,15 @@ def set_state_ahead(ctx, search):
 
 
 @compiled
+def is_zero(value, change, move, t):
+    """Whether a function that changes so much in the time ``move`` is 0 at ``t``, as far as times go."""
+    return abs(value * move) < SHORTEST * abs(t) * abs(change)
+
+
+@compiled
 def begin_anew(ctx, search):
     """Set what is known of the functions at the new state; ACCUMULATE if the trajectory stays there."""
-    t, state = search.time, search.step_state
+    t, state, move = search.time, search.step_state, move_ahead(ctx, search)
     finite = set_state_ahead(ctx, search)
     search.known = t
     for event in range(search.count):
@@ -219,11 +229,13 @@ def begin_anew(ctx, search):
         noise = noise_of(ctx, search, t, state)
         before = search.values_before[event]
         search.touched[event] = NAN
-        if search.due[event] and abs(value) <= noise + RESIDUE * abs(before):
-            ahead = function(ctx, search, t + AHEAD * length_ahead(ctx), search.end_state)
-            if not finite or not abs(ahead - value) > noise:
-                return ACCUMULATE
-            value = TINY * sign(ahead - value)
+        if search.due[event]:
+            ahead = function(ctx, search, t + move, search.end_state)
+            if is_zero(value, ahead - value, move, t) or abs(value) <= noise + RESIDUE * abs(before):
+                moves = finite and abs(ahead - value) > noise
+                if search.due[event] == 1 and not moves:
+                    return ACCUMULATE
+                value = TINY * sign(ahead - value) if moves else 0.0
         elif abs(value) <= noise:
             value = TINY * sign(before if abs(before) > noise else search.ends[event])
         search.ends[event] = value

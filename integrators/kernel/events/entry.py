@@ -1,7 +1,13 @@
 """What the steps call when a step is solved: the one C function of the search for events."""
 
 from integrators.kernel.context import DONE, HALTED
-from integrators.kernel.events.actions import begin_anew, change_state, end_step
+from integrators.kernel.events.actions import (
+    begin_anew,
+    change_state,
+    end_step,
+    move_ahead,
+    set_state_ahead,
+)
 from integrators.kernel.events.chebyshev import keep_samples, keeps_away, refine, suspect, transform
 from integrators.kernel.events.memory import (
     FINEST,
@@ -111,13 +117,18 @@ def set_end(ctx, search):
 
 @compiled
 def begin(ctx, search):
-    """Set what is known of the functions at the start: one that is zero there is no event."""
+    """Set what is known of the functions at the start: a zero there is no event, unless it is due."""
     weigh_first(ctx, search)
     for event in range(search.count):
         search.event = event
         value = function(ctx, search, search.time, search.step_state)
         noise = noise_of(ctx, search, search.time, search.step_state)
         search.ends[event] = 0.0 if abs(value) <= noise else value
+        if search.due[event]:
+            set_state_ahead(ctx, search)
+            ahead = function(ctx, search, search.time + move_ahead(ctx, search), search.end_state)
+            search.ends[event] = -TINY * sign(ahead - value)
+            search.due[event] = 0
         search.finite[event] = 1 if is_finite(value) else 0
         search.touched[event] = NAN
     search.known = search.time

@@ -97,8 +97,10 @@ class EventFunction:
                 if i and times[i] == times[i - 1] and np.array_equal(columns[i], columns[i - 1]):
                     outputs[i] = outputs[i - 1]
                     continue
+                value: Any = np.nan
                 with suppress(*UNDEFINED), np.errstate(all="ignore"):
-                    outputs[i] = self._evaluate(times[i], columns[i].copy(), given)
+                    value = self._evaluate(times[i], columns[i].copy(), given)
+                outputs[i] = float(value)  # what is no number is an error, and not a place without a value
         except BaseException as error:  # also Ctrl-C: nothing passes through compiled code
             self._raised.error = error
             _numbers(values, LANES + 1)[LANES] = 1.0

@@ -65,7 +65,7 @@ class Search(Memory):
     hit_directions = Array(kind=int)
 
     # --- events that change the state, or end it all, at the end of the step; see `events.actions` ---
-    due = Array("count", kind=int)  # 1: it happens there
+    due = Array("count", kind=int)  # 1: it happens there; `NOTED`: it has, and changes nothing
     due_directions = Array("count", kind=int)
     values_before = Array("count")  # of the functions, before the state is changed
     action_state = Array("dim")  # at the first event that ends the step

@@ -195,6 +195,13 @@ class KernelSearch:
         )  # fmt: skip
         return self._hits
 
+    def resume(self, counts: Sequence[int], directions: Sequence[int]) -> None:
+        """Go on counting after a turn; see `integrators.events.finder.Finder`."""
+        self._memory.happened[:] = self._hits.counts[:] = counts
+        self._memory.due[:] = np.array(directions) != 0
+        if self._look(START) != DONE:
+            raise UserError(self._error) from self._error
+
     @property
     def parameters(self) -> Array:
         """The parameters that the last actions have made; shape (n_par,)."""

@@ -10,8 +10,10 @@ from integrators.kernel.parts.events import BEGIN_ANEW, CHANGE
 from integrators.kernel.simd.memory import call_look
 from integrators.kernel.step.advance import looked, solve
 from integrators.kernel.step.anew import begin_anew
+from integrators.kernel.step.begin import begin
 from integrators.kernel.step.control import is_distinct
 from integrators.kernel.step.finish import commit, finish
+from integrators.kernel.step.iterate import settle
 from integrators.kernel.step.vary import attempt
 
 ONWARD = 1.25  # times that are probably enough to see the next one
@@ -19,17 +21,25 @@ ONWARD = 1.25  # times that are probably enough to see the next one
 
 @compiled
 def end_at_action(ctx):
-    """Look for events in the solved step ahead, and solve it anew to the first that changes the state."""
+    """Look for events in the solved step ahead, and solve it anew to the first that changes the state.
+
+    One that is at its start happens there at once, and the step is to be solved again from the new state.
+    """
     events, controller = ctx.events, ctx.controller
     outcome = call_look(events.code, ctx, events.memory)
     if outcome == DONE:
         events.seen = 1
     if outcome != ACTS:
         return outcome
-    part = (events.time - ctx.t0) - ctx.time_low
-    if not is_distinct(part, ctx.t0):
+    if not is_distinct(events.time - events.acted, events.time):
         return ACCUMULATE
     events.length_before = ctx.h if abs(ctx.h) > abs(controller.length_after) else controller.length_after
+    part = (events.time - ctx.t0) - ctx.time_low
+    if not is_distinct(part, ctx.t0):
+        if ctx.implicit.active:
+            ctx.counters.implicit_steps -= 1  # it is not taken
+        events.acting = CHANGE
+        return act(ctx)
     if part != ctx.h:
         ctx.length, controller.rejected = ctx.h, 1
         ctx.solved = UNSOLVED
@@ -37,12 +47,23 @@ def end_at_action(ctx):
             ctx.counters.implicit_steps -= 1  # it is one step
         outcome = attempt(ctx, part)
         controller.rejected = 0
+        if outcome != DONE and ctx.implicit.active == 0:
+            outcome = insist(ctx)
         if outcome != DONE:
             return outcome
         ctx.solved = BY_VALUES
         ctx.surfaces.reached = 0
     events.seen, events.acting = 1, CHANGE
     return DONE
+
+
+@compiled
+def insist(ctx):
+    """Iterate as long as it takes on a step that `attempt` has given up where a shorter one is cheaper."""
+    ctx.length = 0.0
+    begin(ctx)
+    outcome = settle(ctx)
+    return finish(ctx) if outcome == DONE else outcome
 
 
 @compiled

@@ -1,6 +1,6 @@
 """Whole trajectories: steps to the times asked for."""
 
-from integrators.kernel.context import BUDGET, DONE, STATE, UNSEEN, Context
+from integrators.kernel.context import BUDGET, DONE, STATE, UNSEEN, UNSOLVED, Context
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.step.act import act, end_at_action, step_or_act
@@ -53,6 +53,8 @@ def approach(ctx, t, budget):
         outcome = look_first(ctx)
         if outcome != DONE:
             return outcome, budget
+        if ctx.solved == UNSOLVED:  # an event at its start has changed the state
+            continue
         h = abs(ctx.h)
         inside = rest < h - CLOSE * abs(t)
         if inside:
@@ -148,6 +150,8 @@ def take_steps(ctx, times, out, budget):
         outcome = look_first(ctx)
         if outcome != DONE:
             return outcome
+        if ctx.solved == UNSOLVED:  # an event at its start has changed the state
+            continue
         if abs(remaining(ctx, end)) < abs(ctx.h) - CLOSE * abs(end):
             return DONE
         if budget == 0:

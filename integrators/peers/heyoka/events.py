@@ -1,6 +1,6 @@
 """heyoka's own search for events, as a `integrators.events.finder.Finder`."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from itertools import compress
 from typing import Any
 
@@ -68,6 +68,7 @@ class TaylorSearch:
     def __init__(self, events: Mapping[str, Event], y: Array, t: float, end: float, present: Any):
         self._events, self._start, self._end, self._present = list(events.values()), t, end, present
         self._hits = EventLog(events, 1.0 if end >= t else -1.0, y.size)
+        self._y0 = y.copy()
         self._ahead: list[tuple[float, Array, int, int]] = []
         self._counts = [0] * len(events)
         self._finished: float | None = None
@@ -88,10 +89,20 @@ class TaylorSearch:
         if near or sign * (t - self._end) > 0.0 or wanted not in (0, way):
             return
         integrator.update_d_output(t)
-        self._ahead.append((t, integrator.d_output.copy(), event, way))
+        self._note(t, integrator.d_output.copy(), event, way)
+
+    def _note(self, t: float, y: Array, event: int, way: int) -> None:
+        self._ahead.append((t, y, event, way))
         self._counts[event] += 1
         if self.over is None and self._counts[event] == self._events[event].last:
             self.over = t
+
+    def resume(self, counts: Sequence[int], directions: Sequence[int]) -> None:
+        """Go on counting after a turn; see `integrators.events.finder.Finder`."""
+        self._counts, self._hits.counts = list(counts), list(counts)
+        for i, (event, direction) in enumerate(zip(self._events, directions, strict=True)):
+            if direction and event.direction in (0, -direction):
+                self._note(self._start, self._y0, i, -direction)
 
     def take_back(self, t: float) -> None:
         """Forget what happened after a time, from which a step is taken again."""

@@ -3,14 +3,12 @@
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from integrators.protocol import check_is_problem
 from integrators.refusals import check_state
 from integrators.solution import Solution
-from problems import emit
-from problems.bodies import nbody
+from problems.bodies import bodies_of, nbody
 from problems.checks import checked_arguments
 from problems.errors import InputError, shown
 from problems.problem import Problem
@@ -134,17 +132,9 @@ def to_rebound(
         problem = solution.problem.replace(parameters=changed)
     check_is_problem(problem)
 
-    system = problem.system
-    state = problem.y0 if y is None else check_state(y, system.dim)
-    values = system.unpack(problem.par)
-    n = system.dim // 6
-    masses = np.atleast_1d(values.get("m", []))
-    if system.dim % 6 or not 0 < masses.size <= n or (system.dof is not None and masses.size != n):
-        raise InputError(f"{problem!s} has no bodies in space; make it with problems.nbody.")
     time = problem.t0 if t is None else t
-    x = state[: 3 * n].reshape(n, 3)
-    moving = state if system.dof is None else emit.numpy(system, "field")(time, state, problem.par)
-    v = (moving[3 * n :] if system.dof is None else moving[: 3 * n]).reshape(n, 3)
+    masses, x, v = bodies_of(problem, None if y is None else check_state(y, problem.system.dim), time)
+    n, values = len(x), problem.system.unpack(problem.par)
     if simulation is None:
         simulation = load("rebound").Simulation()
         simulation.G, simulation.softening = values.get("G", 1.0), values.get("eps", 0.0)

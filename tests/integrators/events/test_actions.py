@@ -406,3 +406,25 @@ def test_random_kicks_agree_with_a_loop_by_hand():
         assert found.events["kick"].t.shape == times.shape, case
         assert np.abs(found.events["kick"].t - times).max(initial=0.0) < 1e-8  # measured 1e-9
         assert np.abs(found.y[-1] - end).max() < 1e-7  # measured 4e-9
+
+
+@pytest.mark.parametrize("method", [HBVM(), HBVM(tol=1e-8), HBVM(k=8, s=4, h=0.05)], ids=str)
+@pytest.mark.parametrize("end", [20.0, -20.0])
+def test_events_of_one_function_happen_together_once(method, end):
+    phase = 3.7563671
+    problem = Problem(
+        VectorField(lambda y: [y[1], -y[0]], dim=2), y0=[np.cos(phase), -np.sin(phase)], t_end=end
+    )
+    events = [
+        Event(lambda y: y[0], name="plain"),
+        Event(lambda y: y[0], then=lambda y: [3 * y[0], 3 * y[1]], name="first"),
+        Event(lambda y: y[0], then=lambda y: [3 * y[0], 3 * y[1]], name="second"),
+    ]
+    solution = integrate(problem, method, events=events)  # without `insist` the step to an event may fail
+    assert solution.status is Status.FINISHED  # it multiplies the rounding of a zero by nine
+    counts = {name: len(hits) for name, hits in solution.events.items()}
+    assert set(counts.values()) == {6 if end < 0 else 7}
+    plain = solution.events["plain"]
+    assert np.abs(plain.t - solution.events["second"].t).max() < 1e-13  # measured 0
+    radii = np.hypot(*plain.y.T)
+    assert radii == pytest.approx(9.0 ** np.arange(radii.size), rel=1e-13)  # measured 5e-16

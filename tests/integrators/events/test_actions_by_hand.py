@@ -7,8 +7,8 @@ import pytest
 
 import integrators
 import problems
-from integrators import HBVM, Event, Gauss, Status
-from problems import Hamiltonian, Problem
+from integrators import HBVM, Event, Gauss, Status, start
+from problems import Hamiltonian, Problem, VectorField
 from problems.errors import InputError
 
 integrate: Any = integrators.integrate
@@ -176,13 +176,35 @@ def test_what_then_may_not_return_is_said_in_a_sentence():
     found = integrate(pendulum(), HBVM(), events=infinite)
     assert found.status is Status.NOT_FINITE
     assert "then of the event 'passing' returns a number that is not finite" in found.reason
-    switched = Hamiltonian(
-        lambda q, p, par, m, t: p[0] ** 2 / 2 + m.where(t < par.switch, q[0], 2.0 * q[0]) * q[0],
-        dof=1, parameters={"switch": 20.0}, name="switched",
+
+
+@pytest.mark.parametrize("method", [HBVM(), Gauss(s=5, tol=1e-10), HBVM(tol=1e-8)], ids=repr)
+@pytest.mark.parametrize("stepwise", [False, True], ids=["times", "steps"])
+def test_an_event_may_move_the_times_at_which_the_field_switches(method, stepwise):
+    # The fall is braked for a second from the time when a height is passed, and for another from there on.
+    field = VectorField(
+        lambda t, y, par, m: [y[1], m.where(t < par.since, -1.0, m.where(t < par.since + 1.0, 0.5, -1.0))],
+        dim=2, parameters={"since": 50.0}, name="braked",
     )  # fmt: skip
-    late = Event(lambda q: q[0], then=lambda par: (None, {"switch": 1.0 + par.switch}), name="late")
-    with pytest.raises(InputError, match="parameters that the times at which switched switches depend on"):
-        integrate(Problem(switched, y0=[1.0, 0.0], t_end=5.0), HBVM(), events=late)
+    problem = Problem(field, y0=[1.0, 0.0], t_end=6.0)
+    events = [
+        Event(lambda y: y[0] - 0.5, direction=-1, then=lambda t: (None, {"since": t}), name="brake"),
+        Event(lambda t: t - 3.0, then=lambda t: (None, {"since": t + 0.25}), name="again"),
+    ]
+    if stepwise:
+        run = start(problem, method, events=events)
+        while run.t < 6.0 and run.step() is Status.RUNNING:
+            pass
+        y = run.until(6.0)
+        assert run.status is Status.RUNNING
+    else:
+        found = integrate(problem, method, np.linspace(0.0, 6.0, 13), events=events)
+        assert found.status is Status.FINISHED
+        y = found.y[-1]
+    place, speed = 0.5, -1.0  # at t = 1
+    for seconds, push in ((1.0, 0.5), (1.25, -1.0), (1.0, 0.5), (1.75, -1.0)):
+        place, speed = place + speed * seconds + push * seconds**2 / 2.0, speed + push * seconds
+    assert y == pytest.approx([place, speed], abs=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -179,10 +179,17 @@ sys.setprofile(see)
 run.step()
 sys.setprofile(None)
 print(count)
+count = 0
+sys.setprofile(see)
+run.t
+sys.setprofile(None)
+print(count)
 """
 
 
 def test_a_step_calls_few_functions():
     # In a process of its own: one that has run a field in Python takes over Ctrl-C around every step.
     done = subprocess.run([sys.executable, "-c", STEP], capture_output=True, text=True, check=True)
-    assert int(done.stdout) <= 13
+    step, time = map(int, done.stdout.split())
+    assert step <= 11
+    assert time <= 3  # the state is not copied for it

@@ -121,3 +121,71 @@ def test_the_state_is_set_as_a_whole_by_an_operation_in_place():
     assert repr(run.y) == repr(np.asarray(run.y))
     with pytest.raises(problems.InputError, match="set the whole"):
         run.y[2:] *= 0.5
+
+
+OSCILLATOR = problems.Problem(problems.VectorField(lambda y: [y[1], -y[0]], dim=2), y0=[1.0, 0.0], t_end=10.0)
+DOUBLE = Event(lambda t: t - 2.3, then=lambda y: [2 * y[0], 2 * y[1]], name="double")
+WAYS = [HBVM(), Gauss(s=5, tol=1e-10), HBVM(k=8, s=4, h=0.05)]
+
+
+@pytest.mark.parametrize("method", WAYS, ids=str)
+@pytest.mark.parametrize("place", [2.3, np.nextafter(2.3, 3.0), None], ids=["there", "beside", "step"])
+def test_an_event_where_the_run_turns_happens_on_both_ways(method, place):
+    run = start(OSCILLATOR, method, events=DOUBLE)
+    if place is None:
+        while run.t < 2.3:
+            run.step()
+    else:
+        run.until(place)
+    assert len(run.events["double"]) == 1
+    run.until(1.0)
+    assert run.status is Status.RUNNING
+    assert run.events["double"].direction.tolist() == [1, -1]
+    assert abs(np.hypot(*run.y) - 4.0) < 1e-12  # measured 0
+
+
+@pytest.mark.parametrize("method", [*WAYS, Taylor()], ids=str)
+def test_events_are_those_up_to_the_present_and_in_its_order(method):
+    run = start(OSCILLATOR, method, events=[Event(lambda t: (t - 2.3) * (t - 2.35), name="two")])
+    for goal, count in ((2.2, 0), (2.32, 1), (2.4, 2), (2.33, 3), (2.2, 4), (2.32, 5)):
+        run.until(goal)
+        assert len(run.events["two"]) == count
+    assert run.events["two"].t == pytest.approx([2.3, 2.35, 2.35, 2.3, 2.3], abs=1e-14)  # measured 0
+    assert run.events["two"].direction.tolist() == [-1, 1, -1, 1, -1]
+
+
+@pytest.mark.parametrize("method", [*WAYS, Taylor()], ids=str)
+def test_a_terminal_event_counts_the_way_back(method):
+    run = start(OSCILLATOR, method, events=[Event(lambda t: t - 2.3, terminal=3, name="third")])
+    run.until(3.0)
+    run.until(1.0)
+    assert (run.status, len(run.events["third"])) == (Status.RUNNING, 2)
+    run.until(5.0)
+    assert (run.status, len(run.events["third"])) == (Status.EVENT, 3)
+    assert run.t == pytest.approx(2.3, abs=1e-14)  # measured 0
+
+
+@pytest.mark.parametrize("method", METHODS, ids=str)
+def test_steps_go_the_way_of_the_problem_and_of_the_last_goal(method):
+    back = problems.Problem(BALL.system, q0=[1.0], p0=[0.0], t_end=-10.0)
+    run = start(back, method)
+    run.step()
+    assert run.t < 0.0
+    run = start(BALL, method)
+    run.until(-1.0)
+    run.y = run.y
+    run.step()
+    assert run.t < -1.0
+
+
+@pytest.mark.parametrize("method", WAYS, ids=str)
+def test_an_event_function_that_raises_is_a_status_of_the_run(method):
+    def above(t, y):
+        if t > 1.0:
+            raise LookupError("too late")
+        return y[0] + 2.0
+
+    run = start(OSCILLATOR, method, events=Event(above, name="above"))
+    run.until(3.0)
+    assert run.status is Status.USER_ERROR
+    assert "too late" in run.reason
