@@ -81,7 +81,7 @@ class Checks(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     ----------
     starts : int
         Trajectories from which the error growth is found: the problem's own start
-        and perturbed ones; see `hbvm_bench.measure.starts`. 0: no law is sought.
+        and perturbed ones; see `hbvm_bench.measure.starts`. 0: no growth is fitted.
     reversal : float
         Share of the span that is integrated there and back again; 0: none.
     chaos : bool

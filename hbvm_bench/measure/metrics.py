@@ -134,13 +134,13 @@ def invariants_max(m: Measured) -> float | str:
 @metric("power of t of the energy error", "slope", "", scale="linear", same_trajectory=True)
 def energy_slope(m: Measured) -> float | str:
     """Power of t with which the energy error grows, over initial conditions: 1/2 for a random walk."""
-    return _of_law(m, "slope")
+    return _of_growth(m, "slope")
 
 
 @metric("mean energy drift", "drift", "1/time", better=None, scale="linear", same_trajectory=True)
 def energy_rate(m: Measured) -> float | str:
     """Mean signed relative energy error per unit of time, over several initial conditions."""
-    return _of_law(m, "rate")
+    return _of_growth(m, "rate")
 
 
 @metric("energy error at the end, over initial conditions", "energy, rms", "relative", same_trajectory=True)
@@ -155,10 +155,10 @@ def energy_bias(m: Measured) -> float | str:
     """Mean energy error over several initial conditions, in units of the smallest that is called a drift (3
     standard errors; more for few initial conditions): above 1 it is a drift.
     """
-    law = m.laws.get("energy")
-    if law is None or law.mean is None or not law.mean_error:
+    growth = m.growth.get("energy")
+    if growth is None or growth.mean is None or not growth.mean_error:
         return "a mean needs several initial conditions"
-    return abs(law.mean) / (drift.limit(law.starts) * law.mean_error)
+    return abs(growth.mean) / (drift.limit(growth.starts) * growth.mean_error)
 
 
 @metric("smallest energy drift within the interval", "smallest drift", "1/time", same_trajectory=True)
@@ -166,10 +166,10 @@ def energy_rate_least(m: Measured) -> float | str:
     """The drift nearest to 0 in the 95 % interval over several initial conditions; 0 if that
     contains 0.
     """
-    law = m.laws.get("energy")
-    if law is None or law.rate_low is None or law.rate_high is None:
+    growth = m.growth.get("energy")
+    if growth is None or growth.rate_low is None or growth.rate_high is None:
         return "an interval needs several initial conditions"
-    return max(law.rate_low, -law.rate_high, 0.0)
+    return max(growth.rate_low, -growth.rate_high, 0.0)
 
 
 @metric("time-reversal error", "reversal", "length", same_trajectory=True)
@@ -352,13 +352,13 @@ def _of_chaos(m: Measured, name: str, place: int = 0) -> float | str:
     return value if isinstance(value, str) else float(value[place])
 
 
-def _of_law(m: Measured, name: str) -> float | str:
-    """Return a number of the law of the energy's error."""
-    law = m.laws.get("energy")
-    if law is None:
+def _of_growth(m: Measured, name: str) -> float | str:
+    """Return a number of the growth of the energy error."""
+    growth = m.growth.get("energy")
+    if growth is None:
         return "no error growth was fitted"
-    number = getattr(law, name)
-    return law.why or "the samples do not determine it" if number is None else number
+    number = getattr(growth, name)
+    return growth.why or "the samples do not determine it" if number is None else number
 
 
 def _compiled(m: Measured, *, cached: bool, otherwise: str) -> float | str:

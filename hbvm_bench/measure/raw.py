@@ -9,8 +9,8 @@ The series are::
     reversal.y                   the state after integrating there and back, shape (1, dim)
     witness.index, .high, .low   trajectories of an ensemble whose ends are known in 128 bits, and these ends
 
-Errors, laws and metrics are pure functions of this; see `hbvm_bench.measure.reading`. A change here, or in
-what this module imports, makes every stored integration stale; a change there none.
+Errors, their growth and metrics are pure functions of this; see `hbvm_bench.measure.reading`. A change
+here, or in what this module imports, makes every stored integration stale; a change there none.
 """
 
 from dataclasses import replace

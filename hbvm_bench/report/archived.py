@@ -18,6 +18,7 @@ from hbvm_bench.store.store import Store
 from hbvm_bench.summaries.table import Table
 from problems.errors import InputError
 
+FORMER_HEADS = {"law": "growth"}  # of the tables of figures, in archives that are older
 PLACE = "problem-"  # how the anchors of the sections begin whose figures are of series
 
 
@@ -105,6 +106,7 @@ def _drawing(place: str, picture: Picture) -> Drawing:
 
 def _picture(drawing: Drawing) -> Picture:
     head, *rows = [tuple(row) for row in drawing.numbers] or [()]
+    head = tuple(FORMER_HEADS.get(name, name) for name in head)
     return Picture(
         drawing.key,
         drawing.title,

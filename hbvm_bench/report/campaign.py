@@ -29,7 +29,7 @@ from hbvm_bench.report.page import DRAWN_CASES, Results, block
 from hbvm_bench.report.problem import ProblemPart, part
 from hbvm_bench.store import archive
 from hbvm_bench.store.records import Record
-from hbvm_bench.summaries import accuracies, compilations, goals, laws, needs, outcomes
+from hbvm_bench.summaries import accuracies, compilations, goals, growth, needs, outcomes
 from hbvm_bench.summaries.points import by_family, family_of
 from hbvm_bench.summaries.rows import Task, columns, grouped_by, tasks
 from hbvm_bench.summaries.table import Table
@@ -160,7 +160,7 @@ def _overall(results: Results, *, several: bool) -> list[Block]:
     blocks = attempt(
         ("which integrator for which need", partial(needs.table, records)),
         ("which integrator on which problem", partial(_outcomes, records)),
-        ("the growth of the energy error", partial(laws.table, records)),
+        ("the growth of the energy error", partial(growth.table, records)),
         ("performance profiles", partial(profiles, records, numbers)),
     )
     return [Section(title, blocks, "overview", nav="Over all problems" * several)] if blocks else []

@@ -207,20 +207,20 @@ class Counters(msgspec.Struct, frozen=True, kw_only=True):
     solver: str | None = None
 
 
-class Law(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """The law that an invariant's error follows in time; numbers that do not exist are ``None``.
+class ErrorGrowth(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """How an invariant's error grows with time; numbers that do not exist are ``None``.
 
     Attributes
     ----------
-    law : str or None
-        A key of `hbvm_bench.measure.drift.LAWS`; ``None`` where the samples do not say.
+    kind : str or None
+        A key of `hbvm_bench.measure.drift.KINDS`; ``None`` where the samples do not say.
     why : str
-        Why there is no law.
+        Why there is none.
     slope, slope_low, slope_high : float or None
         Power of t, with its 95 % interval.
     floor : float
         What is there before the growth.
-    growth : float or None
+    exponential_rate : float or None
         Rate of an exponential, in 1/t.
     rate, rate_low, rate_high : float or None
         Mean signed drift per unit of time, with its 95 % interval over the starts;
@@ -238,13 +238,13 @@ class Law(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
         Trajectories it was found from.
     """
 
-    law: str | None = None
+    kind: str | None = msgspec.field(default=None, name="law")
     why: str = ""
     slope: float | None = None
     slope_low: float | None = None
     slope_high: float | None = None
     floor: float = 0.0
-    growth: float | None = None
+    exponential_rate: float | None = msgspec.field(default=None, name="growth")
     rate: float | None = None
     rate_low: float | None = None
     rate_high: float | None = None
@@ -272,7 +272,7 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
         Where the integration stopped.
     counters, compile
         What the integration cost.
-    metrics, laws, violation
+    metrics, growth, violation
         What is read off the series: metrics, how the error of each invariant grows, and where a symmetry
         guard says that this is another trajectory than the one asked for. Empty as a worker returns it and
         as the store keeps it; `hbvm_bench.measure.reading` fills them.
@@ -297,7 +297,7 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
     counters: Counters = Counters()
     metrics: dict[str, Value] = {}
     compile: Compile | None = None
-    laws: dict[str, Law] = {}
+    growth: dict[str, ErrorGrowth] = msgspec.field(default_factory=dict, name="laws")
     trajectories: int = 1
     warnings: list[str] = []
     reversal: Value = Value(why="not asked for")
@@ -316,7 +316,7 @@ class Reading(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
 
     metrics: dict[str, Value] = {}
     violation: str = ""
-    laws: dict[str, Law] = {}
+    growth: dict[str, ErrorGrowth] = msgspec.field(default_factory=dict, name="laws")
     digest: str = msgspec.field(default="", name="by")
 
 

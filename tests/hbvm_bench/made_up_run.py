@@ -118,7 +118,7 @@ def made_up(method, number):
 
 def raw_of(result):
     """Return a result as a worker returns it."""
-    return msgspec.structs.replace(result, metrics={}, violation="", laws={})
+    return msgspec.structs.replace(result, metrics={}, violation="", growth={})
 
 
 def sitnikov(store):
@@ -166,7 +166,7 @@ def methods(count):
 
 
 def write(store, texts, count, *, missing=0):
-    """Put a run of made-up cases into a store: errors that follow a law, some failures."""
+    """Put a run of made-up cases into a store: errors that grow in known ways, some failures."""
     store.prepare()
     names, rng = methods(count), np.random.default_rng(1)
     t = np.linspace(0.0, 100.0, 201)

@@ -89,7 +89,7 @@ def _envelopes(axes: Axes, cases: Sequence[Drawn], spots: Sequence[tuple[float, 
         x, y = np.array(best).T
         look = members[0][1].look
         axes.plot(x, y, color=look.light, linewidth=0.8, zorder=1)
-        traces.append(Trace(look.number, f"best of {name}", x, y, "law", "on the Pareto front"))
+        traces.append(Trace(look.number, f"best of {name}", x, y, "fit", "on the Pareto front"))
     return traces
 
 

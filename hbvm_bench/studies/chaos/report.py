@@ -215,7 +215,7 @@ def _exponent_claims(results: Results) -> list[Claim]:
 
 
 def _decided(known: Known, published: Published, here: exponents.Measured) -> str:
-    """Return what an exact law says of a published value outside our interval."""
+    """Return what an exact relation says of a published value outside our interval."""
     low, high = here.intervals[0]
     agrees = "inside" if low <= here.heyoka[0] <= high else "outside"
     other = f"heyoka's value is {here.heyoka[0]:.4f}, {agrees} our interval"

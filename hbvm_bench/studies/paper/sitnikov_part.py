@@ -61,7 +61,7 @@ def _blocks(results: Results) -> list[Maker]:
         ("Figure 3", lambda: figures.stays(run("hbvm"), run("fine"), results["ellipses"])),
         ("Figure 4", lambda: figures.distances(results["orbits"])),
         ("Figure 5", lambda: figures.errors(results["orbits"])),
-        ("energy and angular momentum together", lambda: _both_laws(results["orbits"])),
+        ("energy and angular momentum together", lambda: _both_invariants(results["orbits"])),
         ("nodes", lambda: beyond.by_nodes(results.each("nodes", NODE_STEPS))),
         ("steps", lambda: beyond.by_step(_steps(results))),
         ("step sizes", lambda: beyond.step_table(_steps(results))),
@@ -77,7 +77,7 @@ def _claims(results: Results) -> list[Claim]:
     runs, steps = results["orbits"], _steps(results)
     return [
         *trajectories(runs, results["neighbours"]),
-        *laws(runs, steps, results[f"nodes {sitnikov.H}"]),
+        *conservation(runs, steps, results[f"nodes {sitnikov.H}"]),
         *dynamics(steps, results["growth"]),
     ]
 
@@ -132,7 +132,7 @@ def trajectories(runs: Mapping[str, Orbit], times: Sequence[float | None]) -> li
     ]
 
 
-def laws(
+def conservation(
     runs: Mapping[str, Orbit], steps: Sequence[StepRow], nodes: Sequence[tuple[int, float, float | None]]
 ) -> list[Claim]:
     """Return the claims on energy and angular momentum; ``nodes`` is the scan over k at the paper's step."""
@@ -245,8 +245,8 @@ def both(first: bool, second: bool) -> str:
     return "holds" if first and second else "partly" if first or second else "no"
 
 
-def _both_laws(runs: Mapping[str, Orbit]) -> str | None:
-    """Return what the method that keeps both laws does, where there is one."""
+def _both_invariants(runs: Mapping[str, Orbit]) -> str | None:
+    """Return what the method that conserves both does, where there is one."""
     if "both" not in runs:
         return None
     run, off = runs["both"], float(abs(runs["both"].z[-1] - runs["truth"].z[-1]))

@@ -80,7 +80,7 @@ def _panel(
         axes.plot(x, y, color=colour, linewidth=1.1, linestyle=DOTTED if own else "solid")
         if len(line) > 1:
             number, note = look[family_of(line[0])].number, "on the Pareto front of its row"
-            lines.append(Trace(number, f"best of {row.title}", x, y, "law", note))
+            lines.append(Trace(number, f"best of {row.title}", x, y, "fit", note))
         for record in records:
             mark = look[family_of(record)]
             axes.plot(
@@ -100,7 +100,7 @@ def _panel(
         title,
         Axis(SECONDS, log=True),
         Axis(title, log=True),
-        [*marks, *lines, Trace(0, "required accuracy", *asked_for, "law")],
+        [*marks, *lines, Trace(0, "required accuracy", *asked_for, "fit")],
     )
 
 

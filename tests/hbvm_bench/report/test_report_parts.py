@@ -29,8 +29,8 @@ from tests.hbvm_bench import made_up_run
 def plot(kind: Literal["lines", "dots"] = "lines"):
     x = np.linspace(0.0, 10.0, 101)
     case = Trace(3, 'a "b", c', x, np.where(x > 9.0, np.nan, x**2))
-    law = Trace(3, "a", x, x, role="law", note="t^1/2")
-    return Plot([Panel("p", Axis("x"), Axis("y", log=True), [case, law])], kind)
+    fit = Trace(3, "a", x, x, role="fit", note="t^1/2")
+    return Plot([Panel("p", Axis("x"), Axis("y", log=True), [case, fit])], kind)
 
 
 @settings(max_examples=25, deadline=None)

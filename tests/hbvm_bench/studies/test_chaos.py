@@ -62,7 +62,7 @@ def decided(name, index, here):
     return report._decided(known, known.published[index], here)
 
 
-def test_a_published_spectrum_that_breaks_an_exact_law_is_told():
+def test_a_published_spectrum_that_breaks_an_exact_relation_is_reported():
     rusyn = decided("rucklidge", 1, made_up("rucklidge", 0.3, 0.305, -3.0))
     assert "add up to -3.0016" in rusyn
     assert "heyoka's value is 0.3050, inside our interval" in rusyn
