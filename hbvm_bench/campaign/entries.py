@@ -139,7 +139,7 @@ class Goal(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
         How many times the peer's error ours may be at most, by metric.
     alone : str
         Why the energy is compared without the position or the phase; without a reason such a
-        goal is void.
+        goal is excluded.
     declared : str
         When it was declared, such as ``"2026-11-20"``, with the time of the day where that matters. A run
         writes there when it first had the goal, unless the file says it.

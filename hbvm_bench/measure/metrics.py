@@ -41,8 +41,8 @@ class Metric:
     description: str  # one sentence for readers
     better: Literal["lower"] | None = "lower"  # which way is better; ``None`` where neither is
     scale: Literal["log", "linear"] = "log"  # for axes and number formats
-    same_trajectory: bool = False  # void where a symmetry guard is violated
-    whole_span: bool = True  # void for a case that ended early
+    same_trajectory: bool = False  # excluded where a symmetry guard is violated
+    whole_span: bool = True  # excluded for a case that ended early
     problem: str | None = None  # the only problem that has it, if it is not for all
 
 
@@ -82,7 +82,7 @@ def evaluate(measured: Measured) -> dict[str, Value]:
 
 
 def _value(metric: Metric, measured: Measured) -> Value:
-    """Return a metric of a case, void or without a number where it has to be."""
+    """Return a metric of a case, excluded or without a number where it has to be."""
     with np.errstate(all="ignore"):
         number = metric.function(measured)
     if isinstance(number, str):
@@ -94,7 +94,7 @@ def _value(metric: Metric, measured: Measured) -> Value:
         why = f"only to t = {measured.t_stop:.4g}"
     elif metric.same_trajectory:
         why = guard_violation(measured)
-    return Value(value=float(number), void=bool(why), why=why)
+    return Value(value=float(number), excluded=bool(why), why=why)
 
 
 def find(key: str) -> Metric:

@@ -219,7 +219,7 @@ def bar(metric: Metric, cell: Cell, row: Row) -> int | None:
     """Return how many percent of a double's digits an error leaves right; ``None`` where not an error."""
     error = metric.better == "lower" and metric.unit in ("relative", "length")
     number = row.record.result.metrics[metric.key].value
-    if not error or cell.void or number is None:
+    if not error or cell.excluded or number is None:
         return None
     right = DIGITS if number == 0 else -math.log10(number)
     return round(100 * min(max(right / DIGITS, 0.0), 1.0))

@@ -116,7 +116,7 @@ def _results(block: blocks.Results, level: int) -> str:
 
 
 def row_cells(columns: Sequence[Metric], row: Row) -> list[str]:
-    """Return the cells of a row: void ones in brackets, times with their quartiles."""
+    """Return the cells of a row: excluded ones in brackets, times with their quartiles."""
     cells = []
     for metric in columns:
         text = row.shown(metric.key)

@@ -61,14 +61,14 @@ class Value(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     ----------
     value : float or None
         The number; ``None`` where there is none.
-    void : bool
+    excluded : bool
         Whether the number exists but must not be compared.
     why : str
-        Why there is no number, or why it is void.
+        Why there is no number, or why it is excluded.
     """
 
     value: float | None = None
-    void: bool = False
+    excluded: bool = msgspec.field(default=False, name="void")
     why: str = ""
 
     def __post_init__(self) -> None:
@@ -78,7 +78,7 @@ class Value(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     @property
     def counts(self) -> bool:
         """Whether the number may be compared with other cases'."""
-        return self.value is not None and not self.void
+        return self.value is not None and not self.excluded
 
 
 class Compile(msgspec.Struct, frozen=True, kw_only=True):

@@ -124,9 +124,9 @@ def _compare_numbers(before: Record, after: Record, comparison: Comparison) -> N
         if metric.unit in COSTS or not (key in metrics_before or key in other):
             continue
         a, b = metrics_before.get(key, Value()), other.get(key, Value())
-        if a.value == b.value and a.void == b.void:
+        if a.value == b.value and a.excluded == b.excluded:
             comparison.equal += 1
-        elif a.value is None or b.value is None or a.void != b.void:
+        elif a.value is None or b.value is None or a.excluded != b.excluded:
             differs(metric.label, _shown(metric, a), _shown(metric, b))
         elif not strict and _is_rounding(metric, a.value, b.value):
             comparison.rounded += 1
@@ -136,7 +136,7 @@ def _compare_numbers(before: Record, after: Record, comparison: Comparison) -> N
 
 def _shown(metric: Metric, value: Value) -> str:
     text = format_value(metric, value).text
-    return f"({text}), {value.why}" if value.void else text if value.value is not None else value.why or text
+    return f"({text}), {value.why}" if value.excluded else text if value.value is not None else value.why or text
 
 
 def _is_rounding(metric: Metric, a: float, b: float) -> bool:

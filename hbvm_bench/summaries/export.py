@@ -158,8 +158,8 @@ def _metric(key: str) -> dict[str, tuple[type, Callable[[Record], Any]]]:
         value = evaluated(record).value
         return None if value is None else float(value)
 
-    void, why = (lambda record: evaluated(record).void), (lambda record: evaluated(record).why)
-    return {key: (float, number), f"{key}_void": (bool, void), f"{key}_why": (str, why)}
+    excluded, why = (lambda record: evaluated(record).excluded), (lambda record: evaluated(record).why)
+    return {key: (float, number), f"{key}_void": (bool, excluded), f"{key}_why": (str, why)}
 
 
 def _calibration(timing: Timing) -> float | None:

@@ -33,9 +33,9 @@ class Verdict:
     words: str  # what it is about
     asked: str
     measured: str
-    # void: energies are compared without positions; not judged: the machine had other work
-    verdict: Literal["reached", "missed", "void", "not judged"]
-    why: str  # why nothing was measured, or why it is void or not judged
+    # excluded: energies are compared without positions; not judged: the machine had other work
+    verdict: Literal["reached", "missed", "excluded", "not judged"]
+    why: str  # why nothing was measured, or why it is excluded or not judged
     comparison: Comparison  # the cases that decide; for a goal without a peer it has only ours
     records: Sequence[Record]  # of all cases on the problem
 
@@ -156,7 +156,7 @@ def _against(goal: Goal, entry: ProblemEntry, records: Sequence[Record], ratio: 
     reached = comparison.ratio is not None and comparison.ratio.median >= ratio
     verdict, why = "reached" if reached else "missed", ""
     if blind:
-        verdict, why = "void", "energy is not ranked without position"
+        verdict, why = "excluded", "energy is not ranked without position"
     elif comparison.ratio is None:
         why = (
             "no setting of the other library is as accurate"

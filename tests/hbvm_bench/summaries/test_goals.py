@@ -59,7 +59,7 @@ def test_a_larger_ratio_is_missed():
 
 def test_energy_alone_ranks_nobody():
     found = judged(Goal(against="Taylor", ratio=1.0, within={"energy_max": 1e-10}))
-    assert (found.verdict, found.why) == ("void", "energy is not ranked without position")
+    assert (found.verdict, found.why) == ("excluded", "energy is not ranked without position")
     said = judged(Goal(against="Taylor", ratio=1.0, within={"energy_max": 1e-10}, alone="chaos"))
     assert said.verdict == "reached"
 

@@ -149,8 +149,8 @@ def test_goals_are_listed_with_their_verdict(race):
 
 
 def test_a_race_without_any_valid_run_has_no_figure(race):
-    void = replace(race, records=race.records[5:7])
-    assert work_precision(void, looks([])) is None
+    excluded = replace(race, records=race.records[5:7])
+    assert work_precision(excluded, looks([])) is None
 
 
 def test_fixed_and_adaptive_steps_are_rows_of_their_own_and_the_faster_counts(race):
