@@ -29,10 +29,10 @@ def records(store: Store | Archive) -> list[Record]:
         If the directory holds no run.
     """
     stored = store.records()
-    return stored if isinstance(store, Archive) else [kept(store, record) for record in stored]
+    return stored if isinstance(store, Archive) else [up_to_date(store, record) for record in stored]
 
 
-def kept(store: Store, record: Record) -> Record:
+def up_to_date(store: Store, record: Record) -> Record:
     """Return a record of a store with its reading: the one that is kept, or a new one, which is then kept."""
     if record.result.outcome not in ("ok", "stalled") or record.result.metrics:
         return record

@@ -272,20 +272,20 @@ def busy() -> tuple[float, float, float, float]:
     """
     all_, own = psutil.cpu_times(), os.times()
     spent = sum(getattr(all_, name, 0.0) for name in ("user", "nice", "system", "irq", "softirq"))
-    return spent, stolen(), sum(own[:4]), time.monotonic()
+    return spent, steal_seconds(), sum(own[:4]), time.monotonic()
 
 
-def stolen() -> float:
+def steal_seconds() -> float:
     """Return the steal time of all cores in seconds; 0 where the system does not tell it."""
     return getattr(psutil.cpu_times(), "steal", 0.0)
 
 
 def load_between(before: tuple[float, ...], after: tuple[float, ...]) -> Load | None:
     """Return what else the machine did between two looks at `busy`; ``None`` where they are one."""
-    all_, stolen, own, wall = (b - a for a, b in zip(before, after, strict=True))
+    all_, steal, own, wall = (b - a for a, b in zip(before, after, strict=True))
     if wall <= 0.0:
         return None
-    return Load(others=round(max(all_ - own, 0.0) / wall, 3), stolen=round(stolen / wall, 3))
+    return Load(others=round(max(all_ - own, 0.0) / wall, 3), steal=round(steal / wall, 3))
 
 
 def calibrate(clock: Callable[[], float] = time.perf_counter) -> float:

@@ -12,9 +12,9 @@ from hbvm_bench.report.document import Document, Section
 from hbvm_bench.report.figures.canvas import Picture
 from hbvm_bench.store import archive
 from hbvm_bench.store.archive import Archive, Contents, Drawing
-from hbvm_bench.store.kept import Kept
 from hbvm_bench.store.records import Record
 from hbvm_bench.store.store import Store
+from hbvm_bench.store.stored_run import StoredRun
 from hbvm_bench.summaries.table import Table
 from problems.errors import InputError
 
@@ -61,7 +61,7 @@ def joined(store: Store, before: Path) -> list[Store | Archive]:
 
 
 def _machine(records: Sequence[Record]) -> dict[str, str | int]:
-    return Kept.machine_of(records)
+    return StoredRun.machine_of(records)
 
 
 def _table(store: Store | Archive) -> archive.Table:

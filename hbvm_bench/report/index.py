@@ -13,8 +13,8 @@ from hbvm_bench.report.markdown import plain, printed
 from hbvm_bench.report.page import document
 from hbvm_bench.store import archive
 from hbvm_bench.store.files import write_all
-from hbvm_bench.store.kept import Kept
 from hbvm_bench.store.records import Record
+from hbvm_bench.store.stored_run import StoredRun
 from hbvm_bench.summaries import outcomes
 from hbvm_bench.summaries.table import Table
 from problems.errors import InputError
@@ -120,11 +120,11 @@ def not_measured(directory: Path) -> list[str]:
 def _kinds(path: Path) -> list[str]:
     """Return the kinds of processor whose results an archive holds; none without an archive."""
     runs = [run.records() for run in archive.read(path)] if path.is_file() else []
-    return [machine.kind(Kept.machine_of(records)) for records in runs if records]
+    return [machine.kind(StoredRun.machine_of(records)) for records in runs if records]
 
 
 def _measured(records: Sequence[Record]) -> tuple[str, ...]:
-    described = Kept.machine_of(records)
+    described = StoredRun.machine_of(records)
     names = dict.fromkeys((str(described.get("processor", "unknown")), machine.kind(described)))
     kernels = sorted({record.kernel[: provenance.DIGITS] for record in records if record.kernel})
     return (

@@ -134,12 +134,12 @@ class Load(msgspec.Struct, frozen=True, kw_only=True):
     ----------
     others : float
         Other processes of this machine, over all cores.
-    stolen : float
+    steal : float
         Steal time: CPU time that the machine's host gave to others.
     """
 
     others: float
-    stolen: float
+    steal: float = msgspec.field(name="stolen")
 
 
 class Timing(msgspec.Struct, frozen=True, kw_only=True):

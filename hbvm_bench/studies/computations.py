@@ -65,11 +65,11 @@ class Part:
 
     @property
     def tasks(self) -> list[Task]:
-        """The computations under the names by which they are kept: those of all parts lie side by side."""
+        """The computations under the names by which they are stored: those of all parts lie side by side."""
         return [replace(task, key=f"{self.key}/{task.key}") for task in self.runs]
 
 
-class Kept(msgspec.Struct, frozen=True):
+class StoredResults(msgspec.Struct, frozen=True):
     """What came out, by task: the packed result, or why there is none; and by what code."""
 
     results: dict[str, bytes]
@@ -83,8 +83,10 @@ class Results:
     What `split` divided is put together again. ``records`` are the cases of the run, by method.
     """
 
-    def __init__(self, part: Part, kept: Kept, records: Mapping[str, Record] | None = None) -> None:
-        self.part, self.kept, self.records = part.key, kept, records or {}
+    def __init__(
+        self, part: Part, stored: StoredResults, records: Mapping[str, Record] | None = None
+    ) -> None:
+        self.part, self.stored, self.records = part.key, stored, records or {}
         self.tasks = {task.key: task for task in part.tasks}
         self.read: dict[str, Any] = {}
 
@@ -103,9 +105,9 @@ class Results:
         return {value: self[f"{name} {value}"] for value in values}
 
     def _result(self, key: str) -> Any:
-        if key not in self.kept.results:
-            raise InputError(f"the computation {key!r} {self.kept.failed.get(key, 'was not run')}.")
-        return unpacked(self.kept.results[key], self.tasks[key].run)
+        if key not in self.stored.results:
+            raise InputError(f"the computation {key!r} {self.stored.failed.get(key, 'was not run')}.")
+        return unpacked(self.stored.results[key], self.tasks[key].run)
 
 
 def claims_of(parts: Sequence[tuple[Part, "Results"]], title: str, nav: str, given: str = "paper") -> Section:
@@ -159,7 +161,7 @@ def run_all(
     store: Store,
     done: Callable[[str, str], None],
     variant: str = "",
-) -> Kept:
+) -> StoredResults:
     """Run tasks in so many processes, or here; keep each result at once, so that an end loses no other.
 
     Those that this code has computed for the store, in the same variant, are not run again. ``name`` is that
@@ -167,19 +169,19 @@ def run_all(
     of it.
     """
     code = digest_of(tuple({function_of(task.run).__module__ for task in tasks})) + variant
-    kept = Kept({}, {}, code)
+    stored = StoredResults({}, {}, code)
     with suppress(InputError):
         before = load(name, store.beside())
-        kept = Kept(before.results, {}, code) if before.code == code else kept
-    left = sorted((task for task in tasks if task.key not in kept.results), key=lambda task: -task.cost)
+        stored = StoredResults(before.results, {}, code) if before.code == code else stored
+    left = sorted((task for task in tasks if task.key not in stored.results), key=lambda task: -task.cost)
     for key, data, why, seconds in _outcomes(left, jobs):
         if why:
-            kept.failed[key] = why
+            stored.failed[key] = why
         else:
-            kept.results[key] = data
-        write_json(store.directory / f"{name}.json", kept)
+            stored.results[key] = data
+        write_json(store.directory / f"{name}.json", stored)
         done(key, why or f"{seconds:.1f} s")
-    return kept
+    return stored
 
 
 def _outcomes(tasks: Sequence[Task], jobs: int) -> Iterator[tuple[str, bytes, str, float]]:
@@ -203,7 +205,7 @@ def _side_by_side(tasks: Sequence[Task], jobs: int) -> Iterator[tuple[str, bytes
                 yield futures[future], b"", f"ended with {type(error).__name__}: {error}", 0.0
 
 
-def load(name: str, beside: Mapping[str, object]) -> Kept:
+def load(name: str, beside: Mapping[str, object]) -> StoredResults:
     """Return what a store or an archive keeps of a study beside its cases.
 
     Raises
@@ -214,7 +216,7 @@ def load(name: str, beside: Mapping[str, object]) -> Kept:
     if name not in beside:
         raise InputError(f"the computations of {name} were not run; run hbvm-bench {name} first.")
     try:
-        return msgspec.convert(beside[name], Kept)
+        return msgspec.convert(beside[name], StoredResults)
     except msgspec.ValidationError as error:
         raise InputError(f"what is kept of the computations of {name} is damaged: {error}.") from None
 

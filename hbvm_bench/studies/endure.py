@@ -18,8 +18,8 @@ from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
 from hbvm_bench.report.figures.style import MUTED, Look
 from hbvm_bench.report.page import Results, block
 from hbvm_bench.report.provenance import again
-from hbvm_bench.store.kept import Kept
 from hbvm_bench.store.records import ErrorGrowth
+from hbvm_bench.store.stored_run import StoredRun
 from hbvm_bench.summaries import outcomes, standings
 from hbvm_bench.summaries.goals import Verdict, verdicts
 from hbvm_bench.summaries.goals import table as goals_table
@@ -42,7 +42,7 @@ class Endurance:
 
     Attributes
     ----------
-    run : Kept
+    run : StoredRun
         What was asked for, and the records.
     t : ndarray, shape (n,)
         Sampling times after the start, in years.
@@ -50,7 +50,7 @@ class Endurance:
         Signed relative errors of the energy from each start that reached the end, by method.
     """
 
-    run: Kept
+    run: StoredRun
     t: Array
     errors: dict[str, Array]
 

@@ -136,7 +136,9 @@ def _compare_numbers(before: Record, after: Record, comparison: Comparison) -> N
 
 def _shown(metric: Metric, value: Value) -> str:
     text = format_value(metric, value).text
-    return f"({text}), {value.why}" if value.excluded else text if value.value is not None else value.why or text
+    if value.excluded:
+        return f"({text}), {value.why}"
+    return text if value.value is not None else value.why or text
 
 
 def _is_rounding(metric: Metric, a: float, b: float) -> bool:

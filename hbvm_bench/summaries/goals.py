@@ -112,7 +112,7 @@ def other_work(records: Sequence[Record | None]) -> str:
         return ""
     loads = [item.load for item in timings if item.load is not None]
     shares = [1.0 - median(round_.share for round_ in item.rounds) for item in timings if item.rounds]
-    most = max([0.0, *shares, *(max(load.others, load.stolen) for load in loads)])
+    most = max([0.0, *shares, *(max(load.others, load.steal) for load in loads)])
     return f"other work took {most:.0%} of a core during the timing" if most > OTHER_WORK else ""
 
 

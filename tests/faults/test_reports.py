@@ -9,8 +9,8 @@ import pytest
 
 from hbvm_bench import cli
 from hbvm_bench.store import archive
-from hbvm_bench.store.kept import Kept
 from hbvm_bench.store.store import Store
+from hbvm_bench.store.stored_run import StoredRun
 from problems.errors import InputError
 from tests.hbvm_bench.made_up_run import archived
 from tests.hbvm_bench.studies.race.conftest import made_up as a_race
@@ -86,7 +86,7 @@ def stored_results(directory):
     run = a_duel(said["machine"])
     records = [msgspec.structs.replace(one, versions=said["versions"]) for one in run.records]
     index = msgspec.structs.replace(run.index, command=said["command"])
-    archived(directory / "automatic", Kept(index=index, records=records))
+    archived(directory / "automatic", StoredRun(index=index, records=records))
 
 
 @pytest.mark.parametrize("name", ["race", "endure", "automatic"])

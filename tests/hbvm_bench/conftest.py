@@ -63,4 +63,4 @@ def run_case(case, directory, limits):
     made = decoded(record, Record)
     store = Store(Path(directory))
     store.save(made, series or None)
-    return reading.kept(store, made)
+    return reading.up_to_date(store, made)

@@ -122,7 +122,7 @@ def test_a_run_goes_on_where_it_was_but_not_by_other_code(tmp_path):
     assert list(ran(work(3), tmp_path)[1]) == ["squares/2"]
     assert list(ran(work(3), tmp_path)[1]) == []
     kept = stored(tmp_path)
-    write_json(tmp_path / "paper.json", results.Kept(kept.results, {}, code="another"))
+    write_json(tmp_path / "paper.json", results.StoredResults(kept.results, {}, code="another"))
     assert len(ran(work(3), tmp_path)[1]) == 3
 
 

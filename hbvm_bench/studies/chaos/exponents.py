@@ -98,7 +98,7 @@ def measured(name: str, share: float = 1.0, samples: int = SAMPLES) -> Measured:
         seconds=seconds[0],
         heyoka_seconds=seconds[1],
         others=load.others if load else 0.0,
-        stolen=load.stolen if load else 0.0,
+        stolen=load.steal if load else 0.0,
         divergence=mine.divergence,
     )
 

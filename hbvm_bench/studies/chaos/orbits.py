@@ -170,7 +170,7 @@ def planets(name: str, share: float = 1.0, samples: int = SAMPLES) -> Planets:
         else:
             indicator, exponent = result
             rows.append(Row(key, indicator, exponent, None, None, taken))
-    return Planets(rows, load.others if load else 0.0, load.stolen if load else 0.0)
+    return Planets(rows, load.others if load else 0.0, load.steal if load else 0.0)
 
 
 def _simulation(axis: float, eccentricity: float) -> Any:

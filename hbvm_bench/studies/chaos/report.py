@@ -1,4 +1,4 @@
-"""The page on chaos, from kept results alone: published values and ours, and the maps."""
+"""The page on chaos, from stored results alone: published values and ours, and the maps."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -171,10 +171,10 @@ def experiments(run: Run) -> list[Section]:
 
 
 def _parts(run: Run) -> list[tuple[Part, Results]]:
-    kept = load(NAME, run.beside)
+    stored = load(NAME, run.beside)
     records = {record.case.method: record for record in run.records}
     quick = run.runs[-1].index.campaign.quick
-    return [(part, Results(part, kept, records)) for part in parts(quick=quick)]
+    return [(part, Results(part, stored, records)) for part in parts(quick=quick)]
 
 
 def _none(results: Results) -> list[Claim]:
@@ -306,8 +306,8 @@ HOW = (
 )
 
 
-def _spent(seconds: Sequence[float], others: float, stolen: float) -> str:
-    judged = max(others, stolen) <= OTHER_WORK
+def _spent(seconds: Sequence[float], others: float, steal: float) -> str:
+    judged = max(others, steal) <= OTHER_WORK
     return in_words(median(seconds)) + ("" if judged else " (not judged)")
 
 

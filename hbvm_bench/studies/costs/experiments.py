@@ -129,7 +129,7 @@ def _taken(samples: dict[str, Callable[[], float]], rounds: int) -> Times:
     load = load_between(before, busy())
     if load is None:
         raise InputError("the clock stood still while times were taken.")
-    return Times(dict(zip(samples, seconds, strict=True)), load.others, load.stolen)
+    return Times(dict(zip(samples, seconds, strict=True)), load.others, load.steal)
 
 
 PROGRAM = """

@@ -1,4 +1,4 @@
-"""The page on costs, from kept results alone."""
+"""The page on costs, from stored results alone."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -127,9 +127,9 @@ def tolerances(run: Run) -> list[Section]:
 @block
 def beside(run: Run) -> list[Section]:
     """Return what was computed beside the cases."""
-    kept = load(NAME, run.beside)
+    stored = load(NAME, run.beside)
     quick = run.runs[-1].index.campaign.quick
-    return sections_of([(part, Results(part, kept)) for part in parts(quick=quick)])
+    return sections_of([(part, Results(part, stored)) for part in parts(quick=quick)])
 
 
 @block

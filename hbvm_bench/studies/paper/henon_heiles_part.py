@@ -79,7 +79,7 @@ def _claims(results: Results) -> list[Claim]:
     slopes = max(float(np.abs([x + 2 * x * y, y + x * x - y * y]).max()) for x, y in SADDLES)
     heights = max(abs(float(experiment.potential(np.array(x), np.array(y))) - ESCAPE) for x, y in SADDLES)
     left = {family: int(np.count_nonzero(~np.isnan(values))) for family, values in escaped.items()}
-    largest = {family: kept(rows) for family, rows in steps.items()}
+    largest = {family: largest_step(rows) for family, rows in steps.items()}
     agrees = max(row.agrees for rows in steps.values() for row in rows if row.h == H)
     return [
         Claim(
@@ -127,7 +127,7 @@ def _claims(results: Results) -> list[Claim]:
     ]
 
 
-def kept(rows: Sequence[StepRow]) -> float:
+def largest_step(rows: Sequence[StepRow]) -> float:
     """Return the largest h up to which no orbit leaves with any step; 0 where one leaves with the first."""
     return max((row.h for row in takewhile(lambda row: not _times(row.left), rows)), default=0.0)
 

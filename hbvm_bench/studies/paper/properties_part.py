@@ -66,7 +66,7 @@ def _claims(results: Results) -> list[Claim]:
     back = max(error for _, error in results["reversal"])
     edge, inside = results["stability"]
     scans: list[tuple[list[Row], int]] = [(results["cubic"], 3), (results["quintic"], 5)]
-    kept = max(_kept(rows, nu) for rows, nu in scans)
+    error = max(_largest_error(rows, nu) for rows, nu in scans)
     below = min(error for rows, nu in scans for s, k, error in rows if 2 * k < nu * s and s <= 3)
     same = "; the results are bitwise identical" if results["same bits"] else ""
     ranks_right = results["ranks"] == [s for _, s in PAIRS]
@@ -104,9 +104,9 @@ def _claims(results: Results) -> list[Claim]:
         Claim(
             "It conserves polynomial H of degree ν exactly when k ≥ νs/2",
             "Section 2",
-            f"relative error ≤ {number(kept)} for all k ≥ νs/2 with ν = 3 and 5; for smaller k and s ≤ 3 it "
+            f"relative error ≤ {number(error)} for all k ≥ νs/2 with ν = 3 and 5; for smaller k and s ≤ 3 it "
             f"is {number(below)} or more",
-            "holds" if kept < 1e-13 else "no",
+            "holds" if error < 1e-13 else "no",
         ),
         Claim(
             "The system to solve has block size s, whatever k",
@@ -170,12 +170,12 @@ def threshold(figure: Figure, cubic: Sequence[Row], quintic: Sequence[Row]) -> S
         "Largest relative error of H over [0, 50] with h = 1. Filled: k ≥ νs/2, where the paper "
         "promises exact conservation. The dips to round-off just below it, at high s, are errors below "
         "round-off, not conservation.",
-        f"Largest error for k ≥ νs/2: {_kept(cubic, 3):.1e} for degree 3, {_kept(quintic, 5):.1e} for "
+        f"Largest error for k ≥ νs/2: {_largest_error(cubic, 3):.1e} for degree 3, {_largest_error(quintic, 5):.1e} for "
         "degree 5.",
     )
 
 
-def _kept(rows: Sequence[Row], nu: int) -> float:
+def _largest_error(rows: Sequence[Row], nu: int) -> float:
     return max(error for s, k, error in rows if 2 * k >= nu * s)
 
 

@@ -1,4 +1,4 @@
-"""The page on the original paper's experiments, from kept results alone: claim, paper, here."""
+"""The page on the original paper's experiments, from stored results alone: claim, paper, here."""
 
 from hbvm_bench.report.document import Section
 from hbvm_bench.report.page import Results as Run
@@ -33,5 +33,5 @@ def experiments(run: Run) -> list[Section]:
 
 
 def _parts(run: Run) -> list[tuple[Part, Results]]:
-    kept, records = load(NAME, run.beside), {record.case.method: record for record in run.records}
-    return [(part, Results(part, kept, records)) for part in PARTS]
+    stored, records = load(NAME, run.beside), {record.case.method: record for record in run.records}
+    return [(part, Results(part, stored, records)) for part in PARTS]

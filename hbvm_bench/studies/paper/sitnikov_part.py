@@ -179,7 +179,7 @@ def dynamics(steps: Sequence[StepRow], growth: Sequence[Growth]) -> list[Claim]:
     at = min(growth, key=lambda entry: abs(entry.e - sitnikov.E))
     limit = chaotic_from(growth)
     regular = limit is None or limit > sitnikov.E
-    largest = {family: kept(steps, family) for family in ("gauss", "hbvm")}
+    largest = {family: largest_step(steps, family) for family in ("gauss", "hbvm")}
     return [
         Claim(
             "The large step causes a sham, uniform rotation that does not destroy the symmetry",
@@ -226,8 +226,8 @@ def chaotic_from(growth: Sequence[Growth]) -> float | None:
     return None
 
 
-def kept(steps: Sequence[StepRow], family: str) -> float:
-    """Return the largest h up to which every step keeps the planetoid to the end."""
+def largest_step(steps: Sequence[StepRow], family: str) -> float:
+    """Return the largest h up to which no step loses the planetoid before the end."""
     rows = sorted((row for row in steps if row.family == family and row.s == 2), key=lambda row: row.h)
     return max((row.h for row in takewhile(lambda row: row.usable, rows)), default=0.0)
 

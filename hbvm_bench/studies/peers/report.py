@@ -10,8 +10,8 @@ from hbvm_bench.measure import machine
 from hbvm_bench.measure.timing import Spread
 from hbvm_bench.report.document import Block, Items, Note, Section
 from hbvm_bench.report.page import Results, block
-from hbvm_bench.store.kept import Kept
 from hbvm_bench.store.records import Record
+from hbvm_bench.store.stored_run import StoredRun
 from hbvm_bench.summaries import outcomes
 from hbvm_bench.summaries.compilations import SPREAD, spread
 from hbvm_bench.summaries.rows import Task, at_once, reason_of, tasks
@@ -74,7 +74,7 @@ class Pair:
         return slow and spent[0] - spent[-1] > OVERHEAD
 
 
-def pairs(results: Results, run: Kept) -> list[Pair]:
+def pairs(results: Results, run: StoredRun) -> list[Pair]:
     """Return every method of a run with its library alone, in the order of the campaign."""
     result = []
     for task, records in tasks(run.records).items():
@@ -156,7 +156,7 @@ def costs(results: Results) -> list[Section]:
     ]
 
 
-def _run(results: Results, run: Kept) -> list[Block]:
+def _run(results: Results, run: StoredRun) -> list[Block]:
     measured_pairs = pairs(results, run)
     refused = [
         f"{pair.bench.case.method} on {pair.task.problem}: {pair.failed}"

@@ -15,7 +15,7 @@ from hbvm_bench.store.records import Record
 from hbvm_bench.studies.race.families import FAMILIES, FIXED, OURS, OWN, Row
 from hbvm_bench.studies.race.results import ENERGY, POSITION, Race, counts
 from hbvm_bench.studies.race.tables import power
-from hbvm_bench.summaries.points import family_of, front, number
+from hbvm_bench.summaries.points import family_of, number, pareto_front
 from hbvm_bench.summaries.standings import TIME
 
 FLOOR = -17  # power of ten: smaller errors, exactly 0 among them, are drawn here
@@ -74,7 +74,7 @@ def _panel(
     axes.axhline(level, color=MUTED, linewidth=0.8, linestyle=(0, (3, 3)))
     marks, lines = [], []
     for row, records in rows.items():
-        line = front(records, lambda o: (_seconds(o), _error(o, key)))
+        line = pareto_front(records, lambda o: (_seconds(o), _error(o, key)))
         x, y = np.array([(_seconds(o), _height(o, key)) for o in line]).T
         colour, own = look[family_of(records[0])].light, row.steps == OWN
         axes.plot(x, y, color=colour, linewidth=1.1, linestyle=DOTTED if own else "solid")

@@ -10,8 +10,8 @@ from hbvm_bench.campaign.file import Campaign, ProblemEntry, name_of
 from hbvm_bench.campaign.file import load as load_campaign
 from hbvm_bench.measure import machine
 from hbvm_bench.report.page import Results
-from hbvm_bench.store.kept import Kept
 from hbvm_bench.store.records import Record
+from hbvm_bench.store.stored_run import StoredRun
 from hbvm_bench.studies.race.families import OURS, Row, row_of
 from hbvm_bench.studies.race.probe import PROBES, Probe
 from hbvm_bench.summaries import standings
@@ -32,7 +32,7 @@ class Race:
     ----------
     entry : ProblemEntry
         What the campaign says of it.
-    run : Kept
+    run : StoredRun
         The run it belongs to.
     records : list of Record
         One per setting, in the order of declaration.
@@ -41,7 +41,7 @@ class Race:
     """
 
     entry: ProblemEntry
-    run: Kept
+    run: StoredRun
     records: list[Record]
     probes: list[Probe] = field(default_factory=list)
 
@@ -174,7 +174,7 @@ def probes(results: Results) -> list[Probe]:
         raise InputError(f"the compile times of the race are damaged: {error}.") from None
 
 
-def _contests(runs: Sequence[Kept], measured: Sequence[Probe]) -> list[Race]:
+def _contests(runs: Sequence[StoredRun], measured: Sequence[Probe]) -> list[Race]:
     races = {
         name_of(entry): Race(
             entry, run, records, [probe for probe in measured if probe.problem == name_of(entry)]

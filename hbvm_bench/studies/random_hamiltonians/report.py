@@ -1,4 +1,4 @@
-"""The page on random Hamiltonians, from kept results alone."""
+"""The page on random Hamiltonians, from stored results alone."""
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -72,9 +72,9 @@ COMPUTATIONS = {"compute": computing(NAME, lambda quick: parts(quick=quick))}
 @block
 def trials(run: Run) -> list[Section]:
     """Return what came out."""
-    kept = load(NAME, run.beside)
+    stored = load(NAME, run.beside)
     quick = run.runs[-1].index.campaign.quick
-    return sections_of([(part, Results(part, kept)) for part in parts(quick=quick)])
+    return sections_of([(part, Results(part, stored)) for part in parts(quick=quick)])
 
 
 def position(outcome: Outcome, trial: Trial) -> float:

@@ -41,7 +41,7 @@ def test_the_front_is_what_nothing_beats_in_both():
         tuple(points.number(one, key) for key in ("warm_seconds", "position_end"))
         for one in families["Gauss"]
     ]
-    assert points.front(places, lambda place: place) == [(1.0, 1e-3), (2.0, 1e-9)]
+    assert points.pareto_front(places, lambda place: place) == [(1.0, 1e-3), (2.0, 1e-9)]
     assert list(families) == ["Gauss", "Taylor"]
     assert points.work_of(RUN) == "warm_seconds"
     assert points.work_of([]) == "evaluations"
@@ -207,9 +207,9 @@ def test_times_of_a_busy_machine_are_doubtful():
 
     assert outcomes.doubts([timed(1.0, [0.01, 0.01, 0.01, 0.01])]) == []
     assert "disturbed" in outcomes.doubts([timed(0.5, [])])[0]
-    (loaded,) = outcomes.doubts([timed(1.0, [], load=Load(others=0.57, stolen=0.0))])
+    (loaded,) = outcomes.doubts([timed(1.0, [], load=Load(others=0.57, steal=0.0))])
     assert "used 57% of a core, and the steal time was 0% of one; the times are doubtful" in loaded
-    (quiet,) = outcomes.doubts([timed(1.0, [], load=Load(others=0.1, stolen=0.0))])
+    (quiet,) = outcomes.doubts([timed(1.0, [], load=Load(others=0.1, steal=0.0))])
     assert "doubtful" not in quiet
     assert "not steady" in outcomes.doubts([timed(1.0, [0.01, 0.01, 0.03, 0.03])])[0]
     assert "Nothing was timed" in outcomes.doubts([record("Taylor()")])[0]

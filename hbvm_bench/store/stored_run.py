@@ -8,7 +8,7 @@ from hbvm_bench.store.records import Record
 from hbvm_bench.store.store import Index
 
 
-class Kept(msgspec.Struct, frozen=True, kw_only=True):
+class StoredRun(msgspec.Struct, frozen=True, kw_only=True):
     """A run.
 
     Attributes
