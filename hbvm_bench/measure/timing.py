@@ -63,7 +63,7 @@ class Timeable(ABC):
 
 
 @dataclass(frozen=True, eq=False)
-class Run(Timeable):
+class SingleRun(Timeable):
     """A whole integration that returns its end state only."""
 
     program: Program
@@ -74,7 +74,7 @@ class Run(Timeable):
     sample: str | None  # how the end time is met; see `integrators.protocol.MethodBase.to_end`
 
     @classmethod
-    def compiled(cls, problem: Problem, method: MethodBase, program: Program | None = None) -> "Run":
+    def compiled(cls, problem: Problem, method: MethodBase, program: Program | None = None) -> "SingleRun":
         """Return the run of a method, compiled if it is not yet, which meets its end as its library does."""
         program = method.compile(problem.system) if program is None else program
         return cls(program, problem.y0, problem.par, problem.t0, problem.t_end, method.to_end)
@@ -86,7 +86,7 @@ class Run(Timeable):
         samples = stepper.advance(end, sample=self.sample)
         return clock() - start, samples
 
-    def until(self, share: float) -> "Run":
+    def until(self, share: float) -> "SingleRun":
         return replace(self, t_end=self.t0 + share * (self.t_end - self.t0))
 
 

@@ -64,7 +64,7 @@ def _machine(records: Sequence[Record]) -> dict[str, str | int]:
     return StoredRun.machine_of(records)
 
 
-def _table(store: Store | Archive) -> archive.Table:
+def _table(store: Store | Archive) -> archive.RunColumns:
     index, records = store.index(), reading.records(store)
     store.add_known()
     named = tuple(index.campaign.page.series)

@@ -15,6 +15,7 @@ from hbvm_bench.report import provenance, words
 from hbvm_bench.report.archived import PLACE
 from hbvm_bench.report.document import (
     Block,
+    CaseTable,
     Commands,
     Details,
     Files,
@@ -23,7 +24,6 @@ from hbvm_bench.report.document import (
     Section,
     attempt,
 )
-from hbvm_bench.report.document import Results as Rows
 from hbvm_bench.report.figures.profiles import profiles
 from hbvm_bench.report.page import DRAWN_CASES, Results, block
 from hbvm_bench.report.problem import ProblemPart, part
@@ -200,7 +200,7 @@ def what_came_out(results: Results) -> Section:
     said = [(item.short, item.unit or "–", f"{item.label}. {item.description}") for item in METRICS.values()]
     meaning = Table("", ("column", "unit", "meaning"), said, words=(0, 1, 2))
     blocks += [
-        Rows(columns(records), [item.ranked for item in parts], results.look),
+        CaseTable(columns(records), [item.ranked for item in parts], results.look),
         Details("What the columns mean", [meaning]),
     ]
     return Section("What came out", blocks, "results", nav="Results")

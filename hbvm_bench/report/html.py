@@ -19,9 +19,9 @@ from hbvm_bench.report.archived import PLACE
 from hbvm_bench.report.document import (
     VERDICTS,
     Block,
+    CaseTable,
     Document,
     Links,
-    Results,
     Section,
     is_call,
     pieces,
@@ -107,7 +107,7 @@ def pages(document: Document, folder: Path | None = None) -> dict[str, str]:
         for section in document.blocks
         if isinstance(section, Section) and section.key.startswith(PLACE)
     ]
-    table = next((block for block in document.walk() if isinstance(block, Results)), None)
+    table = next((block for block in document.walk() if isinstance(block, CaseTable)), None)
     if table is None or len(sections) <= TOGETHER or sum(map(len, _rows_by_problem(table))) <= ONE_PAGE:
         return {"index.html": page(document, out=out)}
     names = {section.key: f"{section.key}.html" for section in sections}
@@ -135,7 +135,7 @@ def pages(document: Document, folder: Path | None = None) -> dict[str, str]:
     return texts
 
 
-def _rows_by_problem(table: Results) -> list[list[Row]]:
+def _rows_by_problem(table: CaseTable) -> list[list[Row]]:
     return [[row for _, rows in problem.groups for row in rows] for problem in table.problems]
 
 

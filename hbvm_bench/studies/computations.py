@@ -60,8 +60,8 @@ class Part:
     key: str
     title: str
     runs: Sequence[Task]
-    claims: Callable[["Results"], list[Claim]]  # what a publication says and what came out
-    blocks: Callable[["Results"], list[Maker]]  # what makes each block that is shown
+    claims: Callable[["PartResults"], list[Claim]]  # what a publication says and what came out
+    blocks: Callable[["PartResults"], list[Maker]]  # what makes each block that is shown
 
     @property
     def tasks(self) -> list[Task]:
@@ -77,7 +77,7 @@ class StoredResults(msgspec.Struct, frozen=True):
     code: str
 
 
-class Results:
+class PartResults:
     """What the computations of a part returned, by their names; asking for one that failed says why.
 
     What `split` divided is put together again. ``records`` are the cases of the run, by method.
@@ -110,10 +110,12 @@ class Results:
         return unpacked(self.stored.results[key], self.tasks[key].run)
 
 
-def claims_of(parts: Sequence[tuple[Part, "Results"]], title: str, nav: str, given: str = "paper") -> Section:
+def claims_of(
+    parts: Sequence[tuple[Part, PartResults]], title: str, nav: str, given: str = "paper"
+) -> Section:
     """Return every claim of the parts with what was published, called ``given``, and what came out."""
 
-    def claims(part: Part, results: Results) -> Claims:
+    def claims(part: Part, results: PartResults) -> Claims:
         return Claims([(part.title, part.key, part.claims(results))])
 
     makers = [
@@ -125,7 +127,7 @@ def claims_of(parts: Sequence[tuple[Part, "Results"]], title: str, nav: str, giv
     return Section(title, [Claims(groups, given), *failed], "all-claims", nav=nav)
 
 
-def sections_of(parts: Sequence[tuple[Part, "Results"]]) -> list[Section]:
+def sections_of(parts: Sequence[tuple[Part, PartResults]]) -> list[Section]:
     """Return the section of each part."""
     return [
         Section(part.title, attempt(*part.blocks(results)), part.key, nav=part.title)

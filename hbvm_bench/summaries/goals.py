@@ -15,7 +15,7 @@ from hbvm_bench.summaries import standings
 from hbvm_bench.summaries.outcomes import OTHER_WORK
 from hbvm_bench.summaries.points import number
 from hbvm_bench.summaries.rows import format_metric
-from hbvm_bench.summaries.standings import Comparison
+from hbvm_bench.summaries.standings import SettingComparison
 from hbvm_bench.summaries.table import NONE, Table
 
 TIMES = ("warm_seconds", "throughput")
@@ -36,7 +36,7 @@ class Verdict:
     # excluded: energies are compared without positions; not judged: the machine had other work
     verdict: Literal["reached", "missed", "excluded", "not judged"]
     why: str  # why nothing was measured, or why it is excluded or not judged
-    comparison: Comparison  # the cases that decide; for a goal without a peer it has only ours
+    comparison: SettingComparison  # the cases that decide; for a goal without a peer it has only ours
     records: Sequence[Record]  # of all cases on the problem
 
     @property
@@ -137,7 +137,7 @@ def _judged(goal: Goal, entry: ProblemEntry, records: Sequence[Record]) -> Verdi
         measured=NONE if ours is None else format_metric(ours, goal.metric),
         verdict="not judged" if busy else "reached" if reached else "missed",
         why=next(missing, "") if ours is None else busy,
-        comparison=Comparison(ours, None),
+        comparison=SettingComparison(ours, None),
         records=records,
     )
 
@@ -146,7 +146,7 @@ def _against(goal: Goal, entry: ProblemEntry, records: Sequence[Record], ratio: 
     within = goal.within if goal.within or goal.no_worse else entry.within
     able = standings.among(records, goal.method), standings.among(records, goal.against)
     theirs = standings.best(able[1], within, goal.metric)
-    comparison = Comparison(None, None)
+    comparison = SettingComparison(None, None)
     if theirs is not None:
         allowed = standings.no_worse(theirs, goal.no_worse)
         allowed |= {key: min(bound, allowed.get(key, bound)) for key, bound in within.items()}
@@ -218,7 +218,7 @@ def as_data(judged: Sequence[Verdict]) -> list[dict[str, object]]:
     ]
 
 
-def ratio_data(comparison: Comparison) -> dict[str, object]:
+def ratio_data(comparison: SettingComparison) -> dict[str, object]:
     """Return a comparison as plain data for JSON."""
     low, high = (comparison.ratio.low, comparison.ratio.high) if comparison.ratio else (None, None)
     data: dict[str, object] = {

@@ -8,13 +8,12 @@ from statistics import median
 import numpy as np
 
 from hbvm_bench.report.document import Claim, Items, Maker, Note, Section
-from hbvm_bench.report.page import Results as Run
-from hbvm_bench.report.page import block
+from hbvm_bench.report.page import Results, block
 from hbvm_bench.studies.chaos import exponents, figures, maps, orbits
 from hbvm_bench.studies.chaos.systems import SOURCES, SYSTEMS, Known, Published
 from hbvm_bench.studies.computations import (
     Part,
-    Results,
+    PartResults,
     Task,
     claims_of,
     computing,
@@ -159,30 +158,30 @@ COMPUTATIONS = {"compute": computing(NAME, lambda quick: parts(quick=quick))}
 
 
 @block
-def claims(run: Run) -> Section:
+def claims(run: Results) -> Section:
     """Return every published or exact value with what came out."""
     return claims_of(_parts(run), "Published and exact values", "Values", "published or exact")
 
 
 @block
-def experiments(run: Run) -> list[Section]:
+def experiments(run: Results) -> list[Section]:
     """Return the section of each part."""
     return sections_of(_parts(run))
 
 
-def _parts(run: Run) -> list[tuple[Part, Results]]:
+def _parts(run: Results) -> list[tuple[Part, PartResults]]:
     stored = load(NAME, run.beside)
     records = {record.case.method: record for record in run.records}
     quick = run.runs[-1].index.campaign.quick
-    return [(part, Results(part, stored, records)) for part in parts(quick=quick)]
+    return [(part, PartResults(part, stored, records)) for part in parts(quick=quick)]
 
 
-def _none(results: Results) -> list[Claim]:
+def _none(results: PartResults) -> list[Claim]:
     del results
     return []
 
 
-def _measured(results: Results) -> dict[str, exponents.Measured]:
+def _measured(results: PartResults) -> dict[str, exponents.Measured]:
     return {name: results[f"of {name}"] for name in SYSTEMS}
 
 
@@ -197,7 +196,7 @@ def _within(known: Published, measured: exponents.Measured) -> bool:
     return bool(low <= known.exponents[0] <= high)
 
 
-def _exponent_claims(results: Results) -> list[Claim]:
+def _exponent_claims(results: PartResults) -> list[Claim]:
     judged = []
     for name, here in _measured(results).items():
         for published in SYSTEMS[name].published:
@@ -238,7 +237,7 @@ def _decided(known: Known, published: Published, here: exponents.Measured) -> st
     )
 
 
-def _exact_claims(results: Results) -> list[Claim]:
+def _exact_claims(results: PartResults) -> list[Claim]:
     checks: orbits.Checks = results["checks"]
     curves: orbits.Curves = results["curves"]
     off = abs(checks.sum + 41 / 3)
@@ -279,7 +278,7 @@ def _exact_claims(results: Results) -> list[Claim]:
     ]
 
 
-def _exponent_blocks(share: float, results: Results) -> list[Maker]:
+def _exponent_blocks(share: float, results: PartResults) -> list[Maker]:
     def planets() -> Table:
         return _planets({name: results[f"planets {name}"] for name in orbits.PLANETS}, share)
 
@@ -292,7 +291,7 @@ def _exponent_blocks(share: float, results: Results) -> list[Maker]:
     ]
 
 
-def _curve_blocks(results: Results) -> list[Maker]:
+def _curve_blocks(results: PartResults) -> list[Maker]:
     return [("MEGNO over time", lambda: figures.curves(results["curves"]))]
 
 

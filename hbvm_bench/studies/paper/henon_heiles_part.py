@@ -14,7 +14,7 @@ from hbvm_bench.report.document import Claim, Maker
 from hbvm_bench.report.figures.canvas import log_axis, power_label, say
 from hbvm_bench.report.figures.over_time import envelope
 from hbvm_bench.report.figures.style import INK, MUTED, PAPER
-from hbvm_bench.studies.computations import Part, Results, Task, each, split
+from hbvm_bench.studies.computations import Part, PartResults, Task, each, split
 from hbvm_bench.studies.drawn import COLOURS, WIDTH, Said, drawn, heat, legend_above, number
 from hbvm_bench.studies.paper.experiments import henon_heiles as experiment
 from hbvm_bench.studies.paper.experiments import others
@@ -50,7 +50,7 @@ def _runs() -> list[Task]:
     return runs
 
 
-def _blocks(results: Results) -> list[Maker]:
+def _blocks(results: PartResults) -> list[Maker]:
     return [
         ("the problem", lambda: PROBLEM.format(*experiment.START, results["gauss"][0])),
         ("Figure 1", lambda: level_curves(results["truth"])),
@@ -64,11 +64,11 @@ def _blocks(results: Results) -> list[Maker]:
     ]
 
 
-def _maps(results: Results) -> dict[str, Array]:
+def _maps(results: PartResults) -> dict[str, Array]:
     return {family: np.stack(rows) for family, rows in results.each("map", METHODS).items()}
 
 
-def _claims(results: Results) -> list[Claim]:
+def _claims(results: PartResults) -> list[Claim]:
     gauss: Orbit = results["gauss"][1]
     hbvm: Orbit = results["hbvm"]
     times, steps, escaped = results.each("escapes", METHODS), results.each("steps", METHODS), _maps(results)
@@ -161,7 +161,7 @@ def _step_table(steps: Mapping[str, Sequence[StepRow]]) -> Table:
     )
 
 
-def _others(results: Results) -> Table:
+def _others(results: PartResults) -> Table:
     return others.table(
         "henon-heiles-others",
         results.each("other", others.HENON_HEILES),

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from hbvm_bench.report.document import Claim, Maker
 from hbvm_bench.report.figures.canvas import log_axis, say
 from hbvm_bench.report.figures.style import INK, MUTED, TRUTH
-from hbvm_bench.studies.computations import Part, Results, Task, each
+from hbvm_bench.studies.computations import Part, PartResults, Task, each
 from hbvm_bench.studies.drawn import COLOURS, WIDTH, Said, drawn, legend_above, number
 from hbvm_bench.studies.paper.experiments import others
 from hbvm_bench.studies.paper.experiments import period_annulus as experiment
@@ -67,7 +67,7 @@ def _runs() -> list[Task]:
     ]
 
 
-def _blocks(results: Results) -> list[Maker]:
+def _blocks(results: PartResults) -> list[Maker]:
     entries = partial(_by_entry, results)
     return [
         ("the problem", lambda: PROBLEM),
@@ -87,12 +87,12 @@ def _blocks(results: Results) -> list[Maker]:
     ]
 
 
-def _by_entry(results: Results, name: str) -> dict[Key, Any]:
+def _by_entry(results: PartResults, name: str) -> dict[Key, Any]:
     """Return what was computed for each entry of Table 1."""
     return {(h, s): results[f"{name} {h} {s}"] for h, s in PRINTED}
 
 
-def _claims(results: Results) -> list[Claim]:
+def _claims(results: PartResults) -> list[Claim]:
     cells: dict[Key, dict[str, Edge]] = _by_entry(results, "cell")
     orbits: dict[str, Path] = results["drawn"]
     rest = max(float(np.abs(experiment.field(point)).max()) for point in (P1, P2))
@@ -220,7 +220,7 @@ def _spread_table(spreads: Mapping[Key, Sequence[float]]) -> Table:
     )
 
 
-def _others(results: Results) -> Table:
+def _others(results: PartResults) -> Table:
     return others.table(
         "period-annulus-others",
         results.each("other", others.PERIOD_ANNULUS),

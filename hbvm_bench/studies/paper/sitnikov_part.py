@@ -8,7 +8,7 @@ import numpy as np
 
 from hbvm_bench.report.document import Claim, Maker
 from hbvm_bench.store.records import Record, Value
-from hbvm_bench.studies.computations import Part, Results, Task, each, split
+from hbvm_bench.studies.computations import Part, PartResults, Task, each, split
 from hbvm_bench.studies.drawn import number
 from hbvm_bench.studies.paper import sitnikov_beyond as beyond
 from hbvm_bench.studies.paper import sitnikov_figures as figures
@@ -50,7 +50,7 @@ def _runs() -> list[Task]:
     ]
 
 
-def _blocks(results: Results) -> list[Maker]:
+def _blocks(results: PartResults) -> list[Maker]:
     def run(name: str) -> Orbit:
         return results["orbits"][name]
 
@@ -73,7 +73,7 @@ def _blocks(results: Results) -> list[Maker]:
     ]
 
 
-def _claims(results: Results) -> list[Claim]:
+def _claims(results: PartResults) -> list[Claim]:
     runs, steps = results["orbits"], _steps(results)
     return [
         *trajectories(runs, results["neighbours"]),
@@ -82,7 +82,7 @@ def _claims(results: Results) -> list[Claim]:
     ]
 
 
-def _steps(results: Results) -> list[StepRow]:
+def _steps(results: PartResults) -> list[StepRow]:
     """Return what Gauss and HBVM do with each step; either scan begins with the reference solution."""
     return [*results["steps 2"][1:], *results["steps 3"][1:]]
 
@@ -260,7 +260,7 @@ def _both_invariants(runs: Mapping[str, Orbit]) -> str | None:
     )
 
 
-def _plainly(results: Results) -> str:
+def _plainly(results: PartResults) -> str:
     result = row(_steps(results), "hbvm", sitnikov.H)
     paper, ours = (
         results.records[text].result for text in ("HBVM(k=18, s=2, h=0.5)", "HBVM(k=16, s=8, h=0.125)")
@@ -281,7 +281,7 @@ def _plainly(results: Results) -> str:
 METRICS = ("energy_max", "angular_momentum_max", "guard_max", "z_error", "evaluations")
 
 
-def _others(results: Results) -> Table:
+def _others(results: PartResults) -> Table:
     return others.table(
         "sitnikov-others",
         {text: _row(record) for text, record in results.records.items()},
@@ -299,13 +299,15 @@ def _others(results: Results) -> Table:
     )
 
 
-def _row(record: Record) -> others.Row:
+def _row(record: Record) -> others.MethodRow:
     if group_of(record) == "ended":
         refused = record.result.outcome == "refused"
-        return others.Row(record.case.method, {}, record.result.reason if refused else status_of(record))
+        return others.MethodRow(
+            record.case.method, {}, record.result.reason if refused else status_of(record)
+        )
     pairs = ((name, record.result.metrics.get(name, Value()).value) for name in METRICS)
     numbers = {name: value for name, value in pairs if value is not None}
-    return others.Row(record.case.method, numbers, _remark(numbers))
+    return others.MethodRow(record.case.method, numbers, _remark(numbers))
 
 
 def _remark(numbers: Mapping[str, float]) -> str:

@@ -12,7 +12,7 @@ from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture, st
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
 from hbvm_bench.report.figures.style import MUTED, PAPER, Look
 from hbvm_bench.store.records import Record
-from hbvm_bench.studies.race.families import FAMILIES, FIXED, OURS, OWN, Row
+from hbvm_bench.studies.race.families import FAMILIES, FIXED, OURS, OWN, FamilyRow
 from hbvm_bench.studies.race.results import ENERGY, POSITION, Race, counts
 from hbvm_bench.studies.race.tables import power
 from hbvm_bench.summaries.points import family_of, number, pareto_front
@@ -61,7 +61,7 @@ def _panel(
     title: str,
     level: float,
     key: str,
-    rows: Mapping[Row, Sequence[Record]],
+    rows: Mapping[FamilyRow, Sequence[Record]],
     look: Mapping[str, Look],
 ) -> Panel:
     """Draw one error against time, and return the same for the page."""

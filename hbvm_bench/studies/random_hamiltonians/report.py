@@ -9,11 +9,10 @@ from matplotlib.figure import Figure
 
 from hbvm_bench.report.document import Items, Maker, Note, Section
 from hbvm_bench.report.figures.style import INK, MUTED
-from hbvm_bench.report.page import Results as Run
-from hbvm_bench.report.page import block
+from hbvm_bench.report.page import Results, block
 from hbvm_bench.studies.computations import (
     Part,
-    Results,
+    PartResults,
     Task,
     computing,
     load,
@@ -51,7 +50,7 @@ def parts(*, quick: bool) -> list[Part]:
     methods = QUICK_METHODS if quick else METHODS
     tasks = [Task(f"of {i}", partial(outcomes, list(piece), methods)) for i, piece in enumerate(pieces)]
 
-    def blocks(results: Results) -> list[Maker]:
+    def blocks(results: PartResults) -> list[Maker]:
         outcomes = [outcome for i in range(len(pieces)) for outcome in results[f"of {i}"]]
         return [
             ("how often", lambda: wrong(outcomes, position, "position", POSITION)),
@@ -70,11 +69,11 @@ COMPUTATIONS = {"compute": computing(NAME, lambda quick: parts(quick=quick))}
 
 
 @block
-def trials(run: Run) -> list[Section]:
+def trials(run: Results) -> list[Section]:
     """Return what came out."""
     stored = load(NAME, run.beside)
     quick = run.runs[-1].index.campaign.quick
-    return sections_of([(part, Results(part, stored)) for part in parts(quick=quick)])
+    return sections_of([(part, PartResults(part, stored)) for part in parts(quick=quick)])
 
 
 def position(outcome: Outcome, trial: Trial) -> float:
