@@ -5,9 +5,10 @@ like t^(1/2) (Brouwer's law); a biased rounding, or a method that does not conse
 makes it grow like t; a fixed amplitude is what a symplectic method at a step that
 resolves the motion shows before its round-off does. Several can act at once,
 so each is fitted together with a floor, in logarithms, to the rms over windows of
-time that are equally long in log t, and over trajectories from perturbed starts.
-The power of t alone does not tell a random walk from one that drifts slowly: the
-mean over the starts is tested against its own scatter before a growth is named.
+time that are equally long in log t, and over trajectories from perturbed initial
+conditions. The power of t alone does not tell a random walk from one that drifts
+slowly: the mean over the initial conditions is tested against its own scatter
+before a growth is named.
 
 D. Brouwer, "On the accumulation of errors in numerical integration",
 The Astronomical Journal 46 (1937) 149-153.
@@ -31,7 +32,7 @@ FEWEST_ABOVE = 3  # windows in which a growth is above its floor: fewer may be a
 SHORTEST = 1.2  # decades
 NOISE = 0.05  # of the logarithm: no fit is taken to be better than this
 CONFIDENCE = 0.95
-STANDARD_ERRORS = 3.0  # by which the mean over the starts must be away from 0 to be called a drift
+STANDARD_ERRORS = 3.0  # from 0, beyond which a mean is called a drift
 EVIDENCE = 6.0  # by which the criterion of a growth must beat a bound: strong evidence
 STEEPEST = 12.0  # powers of t, and e-foldings times 40, that are searched
 
@@ -39,7 +40,7 @@ KINDS: dict[str, str] = {
     "bounded": "stays within a bound",
     "power": "grows like a power of t",
     "exponential": "grows like exp(t)",
-    "drift": "drifts: the mean over the starts is not 0",
+    "drift": "drifts: the mean over the initial conditions is not 0",
 }
 CURVES = [kind for kind in KINDS if kind != "drift"]  # that are fitted; a drift is told by the mean
 
@@ -59,7 +60,7 @@ def curve(growth: ErrorGrowth, t: ArrayLike) -> Array:
 
 
 def drifts(growth: ErrorGrowth) -> bool | None:
-    """Whether the mean is more than `limit` standard errors from 0; ``None`` for one start."""
+    """Whether the mean is more than `limit` standard errors from 0; ``None`` for one trajectory."""
     if growth.mean is None or growth.mean_error is None:
         return None
     return abs(growth.mean) > limit(growth.starts) * growth.mean_error
@@ -76,7 +77,7 @@ def rms(errors: ArrayLike) -> Array:
 def limit(starts: int) -> float:
     """Return how many standard errors a mean over ``starts`` may be from 0 and not be called a drift.
 
-    `STANDARD_ERRORS`, or Student's 95 % quantile where few starts make that larger.
+    `STANDARD_ERRORS`, or Student's 95 % quantile where few trajectories make that larger.
     """
     return max(STANDARD_ERRORS, _quantile(starts))
 
@@ -95,22 +96,26 @@ def false_alarms(starts: int) -> float:
 
 
 def told(starts: int) -> str:
-    """Return when a mean over so many starts, at least two, is called a drift, and how often wrongly."""
+    """Return when a mean over at least two initial conditions is called a drift, and how often wrongly."""
     return (
-        f"A drift is reported where the mean over the {starts} starts is more than {limit(starts):.3g} of "
-        "its standard errors from 0; of errors that do not drift, chance puts "
-        f"{100.0 * false_alarms(starts):.1g} % there"
+        f"A drift is reported where the mean over the {starts} initial conditions is more than "
+        f"{limit(starts):.3g} standard errors from 0; without a drift, chance exceeds this in "
+        f"{100.0 * false_alarms(starts):.1g} % of all runs"
     )
 
 
 def uncertainty(starts: int) -> str:
-    """Return how well so many starts know a root mean square; nothing for one start."""
+    """Return the uncertainty of a root mean square over initial conditions; nothing for one."""
     share = 100.0 / math.sqrt(2.0 * starts) if starts > 1 else 0.0
-    return f" A root mean square over {starts} starts is known to ±{share:.0f} %." if share else ""
+    return (
+        f" A root mean square over {starts} initial conditions has an uncertainty of ±{share:.0f} %."
+        if share
+        else ""
+    )
 
 
 def mean(t: ArrayLike, errors: ArrayLike) -> ErrorGrowth:
-    """Return the mean over the starts of what the errors have grown by at the end, without a fit.
+    """Return the mean growth of the errors to the end over the initial conditions, without a fit.
 
     The offset of a trajectory, its mean over the first window of time, is taken off:
     what the evaluation of an invariant adds throughout is no drift. End less begin is
@@ -134,8 +139,8 @@ def mean(t: ArrayLike, errors: ArrayLike) -> ErrorGrowth:
 def fit(t: ArrayLike, errors: ArrayLike, *, signed: bool = True) -> ErrorGrowth:
     """Find how an error grows with time.
 
-    Signed errors that grow by a power of t are called a drift where the mean over the starts is
-    one (`drifts`). Samples that are not finite end the series; fewer than two leave no growth.
+    Signed errors that grow by a power of t are called a drift where the mean over the initial conditions
+    is one (`drifts`). Samples that are not finite end the series; fewer than two leave no growth.
 
     Parameters
     ----------
@@ -149,8 +154,8 @@ def fit(t: ArrayLike, errors: ArrayLike, *, signed: bool = True) -> ErrorGrowth:
     Returns
     -------
     ErrorGrowth
-        Intervals from leaving out one start at a time, or from the scatter about the fit
-        where there are fewer than three starts.
+        Intervals from leaving out one trajectory at a time, or from the scatter about the fit
+        where there are fewer than three.
 
     Raises
     ------
@@ -257,7 +262,7 @@ def _score(residual: NDArray[np.floating], parameters: int) -> float:
 
 
 def _slope(t: Array, rows: Array, whole: _Fit) -> tuple[float, float, float]:
-    """Return the power of t and its interval, by the jackknife over starts where there are three."""
+    """Return the power of t and its interval, by the jackknife over trajectories where there are three."""
     slope = whole.parameters[2]
     starts = len(rows)
     if starts < 3:

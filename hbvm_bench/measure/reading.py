@@ -21,7 +21,7 @@ from problems.errors import InputError
 
 
 def records(store: Store | Archive) -> list[Record]:
-    """Return the records of a run as `Store.records` does, with what is read off them.
+    """Return the records of a run as `Store.records` does, with their readings.
 
     Raises
     ------

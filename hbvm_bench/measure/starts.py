@@ -31,7 +31,7 @@ def scaled(problem: Problem, count: int) -> Array:
 
 
 def members(problem: Problem, asked: Ensemble) -> tuple[Array, Array]:
-    """Return the starts and the parameters of an ensemble, shapes (n, dim) and (n, n_par).
+    """Return the initial conditions and the parameters of an ensemble, shapes (n, dim) and (n, n_par).
 
     The first is the problem's own. Every number of the start, and each parameter that varies, is
     multiplied by 1 + spread x, where x runs evenly through [-1, 1] in all of them together: the Weyl

@@ -203,7 +203,7 @@ def what_came_out(results: Results) -> Section:
         CaseTable(columns(records), [item.ranked for item in parts], results.look),
         Details("What the columns mean", [meaning]),
     ]
-    return Section("What came out", blocks, "results", nav="Results")
+    return Section("Results", blocks, "results", nav="Results")
 
 
 @block

@@ -21,10 +21,11 @@ from problems.errors import InputError
 
 DOCUMENTS = ("README.md", "report.md")  # what a report is read from
 LEAD = (
-    "Every report is written by the command that it names; nothing in it is by hand. A text (`report.md` or "
+    "Every report is written by the command that it names; nothing in it is written by hand. A text "
+    "(`report.md` or "
     "`README.md`) with its figures is committed beside the results that it is made from. The pages, "
     "`NAME/index.html` with all figures and all rows, are drawn from these results by `make pages`, without "
-    "running anything; git ignores them, but for sitnikov's."
+    "running anything; git ignores them, except that of sitnikov."
 )
 WIDTH = 360  # pixels of a thumbnail
 LONGEST = 400  # characters of a description
@@ -92,7 +93,8 @@ def conditions(directory: Path) -> Table:
         ("report", "date", "processor", "kernel", "other processes", "host"),
         rows,
         "Kernel: the first digits of the digest of its sources, without comments. Other processes, host: "
-        "what they used of a core while the times of each problem were taken, the least to the most.",
+        "the share of a core that they used while the times of each problem were taken, from the "
+        "smallest to the largest.",
         words=range(6),
         key="conditions",
     )

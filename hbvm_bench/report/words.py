@@ -25,7 +25,7 @@ RIGHT = {"position_end": 1e-8, "energy_max": 1e-13}
 BEST = 3  # of them
 SHORTEST_RUN = 1e-6  # seconds; no whole integration takes less
 
-WITNESSES = (
+REFERENCE_SUBSET = (
     "The position errors are the largest of {} trajectories, taken evenly from all, whose ends are known in "
     "128 bits, relative to the largest distance of a body from the origin at these ends."
 )
@@ -64,7 +64,8 @@ the part that was integrated are excluded.
 TIMES = (
     "Times are those of whole integrations without output, compiled beforehand, with one thread on one "
     "core, in a pass of their own with no other case running. {visits} {sample} The table gives the median "
-    "and the quartiles; all samples are in the store. Compilation is stated apart. Each library integrates "
+    "and the quartiles; all samples are in the store. Compile times are given separately. Each library "
+    "integrates "
     "to the end as its own documentation describes; `hbvm-bench run peers` measures what the bench adds to "
     "its time."
 )

@@ -9,7 +9,7 @@ The file is JSON, compressed by ``xz``::
     drawings            figures of the other series: these have a thousand times the numbers that are shown
     beside              what a study keeps beside its cases
 
-What was read off the series is in the columns, as it was read when the file was written.
+What was computed from the series is in the columns, as it was read when the file was written.
 """
 
 import lzma
@@ -130,7 +130,7 @@ class Archive:
         return self._index
 
     def records(self) -> list[Record]:
-        """Return the records with what was read off them, in the order of the campaign."""
+        """Return the records with what was computed from them, in the order of the campaign."""
         return self._records
 
 

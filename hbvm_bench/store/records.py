@@ -223,13 +223,13 @@ class ErrorGrowth(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
     exponential_rate : float or None
         Rate of an exponential, in 1/t.
     rate, rate_low, rate_high : float or None
-        Mean signed drift per unit of time, with its 95 % interval over the starts;
+        Mean signed drift per unit of time, with its 95 % interval over the initial conditions;
         for the energy only, the other invariants' errors have no sign.
     mean, mean_error : float or None
-        Mean over the starts at the end, without the offset of each
-        (`hbvm_bench.measure.drift.mean`); its standard error with several starts only.
+        Mean over the initial conditions at the end, without the offset of each
+        (`hbvm_bench.measure.drift.mean`); its standard error where there are several.
     positive : int or None
-        How many of the starts end above 0.
+        How many of the errors end above 0.
     reached : float
         What the growth alone reached at the end.
     end : float
@@ -273,7 +273,7 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
     counters, compile
         What the integration cost.
     metrics, growth, violation
-        What is read off the series: metrics, how the error of each invariant grows, and where a symmetry
+        What is computed from the series: metrics, how the error of each invariant grows, and where a symmetry
         guard says that this is another trajectory than the one asked for. Empty as a worker returns it and
         as the store keeps it; `hbvm_bench.measure.reading` fills them.
     warnings : list of str
@@ -306,7 +306,7 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Reading(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """What was read off the series of a case; see `Result` for the first three.
+    """What was computed from the series of a case; see `Result` for the first three.
 
     Attributes
     ----------

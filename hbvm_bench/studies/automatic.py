@@ -1,4 +1,4 @@
-"""HBVM with default settings against heyoka's Taylor method: no setting on our side."""
+"""HBVM with default settings against heyoka's Taylor method."""
 
 import textwrap
 from collections.abc import Mapping, Sequence

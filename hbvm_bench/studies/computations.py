@@ -1,8 +1,8 @@
-"""The computations behind the page of a study: run side by side, kept beside the cases, and read again.
+"""The computations behind the page of a study: run side by side, stored beside the cases, and read again.
 
-They are what no integration of a campaign is: bisections, maps of many starts, sections, orders. What one
-returns is kept as MessagePack, in which not-a-number and every bit of a double survive; the type that its
-function is annotated with says how it is read again.
+They are no integrations of a campaign: bisections, maps of many initial conditions, sections, orders. What
+one returns is stored as MessagePack, in which not-a-number and every bit of a double survive; the type
+that its function is annotated with says how it is read again.
 """
 
 import functools

@@ -120,7 +120,7 @@ class Line:
     starts, failed : int
         Trajectories that finished and that did not.
     rms : dict of float to float
-        Root mean square over the starts of the relative energy error, by time in years.
+        Root mean square over the initial conditions of the relative energy error, by time in years.
     drift : ErrorGrowth or None
         Of its error; ``None`` without a finished trajectory.
     seconds : float or None
@@ -213,7 +213,7 @@ def errors_and_goals(results: Results) -> list[Table]:
 
 @block
 def energy_over_time(results: Results) -> Picture | None:
-    """Draw the rms over the starts against time."""
+    """Draw the rms over the initial conditions against time."""
     return over_time(measured_last(results), results.look)
 
 
@@ -282,7 +282,7 @@ def _named(growth: ErrorGrowth) -> str:
 
 
 def _mean(growth: ErrorGrowth) -> str:
-    """Return the mean over the starts with its standard error and the count of signs."""
+    """Return the mean over the initial conditions with its standard error and the count of signs."""
     spread = "" if growth.mean_error is None else f" ± {growth.mean_error:.1e}"
     return f"{growth.mean:+.1e}{spread} ({growth.positive} of {growth.starts} positive)"
 
@@ -295,7 +295,7 @@ def _rate(growth: ErrorGrowth) -> str:
 
 @styled
 def over_time(result: Endurance, look: Mapping[str, Look]) -> Picture | None:
-    """Draw the rms over the starts against time, with every start behind it; ``None`` without any."""
+    """Draw the rms over the trajectories against time, with each of them behind it; ``None`` without any."""
     t = result.t
     shown = [(method, errors) for method, errors in result.errors.items() if errors.size]
     if not shown:

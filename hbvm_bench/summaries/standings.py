@@ -1,4 +1,4 @@
-"""Who is how fast at which accuracy: read off the records of a problem, the same way for every family.
+"""Run times at required accuracies, from the records of a problem, the same way for every family.
 
 Times that chose a setting do not compare it; see `hbvm_bench.measure.timing.chooses`.
 """

@@ -47,7 +47,7 @@ def test_a_campaign_with_an_ensemble_is_run_and_reported_as_it_is_typed(tmp_path
     assert "| `Gauss(s=2, h=0.25)` |" in ours
     assert "| `Gauss(s=3, h=0.25)` |" not in ours
     assert "| `Gauss(s=3, h=0.25)` |" in together
-    one, several = text[text.index("What came out") : text.index("\n| # | method")].split("3 trajectories", 1)
+    one, several = text[text.index("## Results") : text.index("\n| # | method")].split("3 trajectories", 1)
     assert "at these ends" in several
     assert "at these ends" not in one
     assert "3 trajectories at once" in (tmp_path / "r" / "index.html").read_text(encoding="utf-8")

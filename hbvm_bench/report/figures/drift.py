@@ -96,7 +96,7 @@ def _drift(case: Drawn) -> Found | None:
 
 
 def _windows(t: Array, rows: Array) -> tuple[Array, Array]:
-    """Return the rms over starts in windows that are equally long in log t; what is 0 is left out."""
+    """Return the rms over trajectories in windows that are equally long in log t; zeros are left out."""
     good = np.isfinite(rows).all(axis=0) & (t > 0)
     t, each = t[good], drift.rms(rows[:, good])
     if not t.size:

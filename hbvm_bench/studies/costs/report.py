@@ -227,7 +227,7 @@ def iterations(counted: Mapping[int, Mapping[str, Iterations]], t_end: float) ->
         f"{method}, {what}" for method in ON_LATTICES for what in ("iterations a step", "steps", "solver")
     ]
     return Table(
-        "Iterations a step on the discrete nonlinear Schroedinger equation",
+        "Iterations per step on the discrete nonlinear Schroedinger equation",
         ("places", *heads),
         rows,
         f"From a rough start to t = {t_end:g}: `hbvm_bench.studies.costs.lattice`.",
@@ -245,7 +245,7 @@ def calls(times: Times) -> Table:
         1e6,
         "µs",
         f"Kepler's problem to t = {experiments.SHORT:g}; a sample is the mean of {experiments.BATCH} calls, "
-        "each with a method that is made anew; the system is the same.",
+        "each with a new method object; the system is the same.",
     )
 
 

@@ -119,8 +119,8 @@ def table(taken: Times) -> Table:
         ("method", "alone (µs)", *(f"{n} vector{'s' * (n > 1)}" for n in COUNTS[1:]), "samples", "verdict"),
         rows,
         f"The Hénon–Heiles problem to t = {END:g}, in one process: the median of the ratio within each "
-        "round, and its quartiles. A vector is the derivative with respect to one component of the start; "
-        "the orbit is chaotic, and vectors grow.",
+        "round, and its quartiles. A vector is the derivative with respect to one component of the "
+        "initial state; the orbit is chaotic, and the vectors grow.",
         words=(0, 5),
         key="costs-variations",
     )

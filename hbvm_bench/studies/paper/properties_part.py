@@ -47,15 +47,15 @@ def _collocation(residuals: Sequence[ErrorRow], defects: Sequence[tuple[str, flo
     residual = "residual of σ′ = Σ Pⱼ ∫ Pⱼ f(σ) at the nodes"
     defect = "|MᵀJM − J|, M the derivative of one step"
     return Table(
-        "Extended collocation conditions, and what is not symplectic",
+        "Extended collocation conditions, and symplecticity",
         ("method", "quantity", "defect"),
         [
             *((f"HBVM(k={k}, s={s}, h=0.5)", residual, number(value)) for k, s, value in residuals),
             *((method, defect, number(value)) for method, value in defects),
         ],
         "The residual is on the quintic, where the integrals are exact from k ≥ 5s/2 on; "
-        "the derivative on Hénon–Heiles. HBVM with k > s conserves the energy and is not "
-        "symplectic; Gauss the other way about.",
+        "the derivative on Hénon–Heiles. HBVM with k > s conserves the energy and is not symplectic; for "
+        "Gauss it is the reverse.",
         words=(0, 1),
         key="claims-collocation",
     )
@@ -85,7 +85,7 @@ def _claims(results: PartResults) -> list[Claim]:
         Claim(
             "It is symmetric",
             "Section 2",
-            f"to t = 100 and back misses the start by {number(back)} at most",
+            f"to t = 100 and back misses the initial state by {number(back)} at most",
             "holds" if back < 1e-12 else "no",
         ),
         Claim(

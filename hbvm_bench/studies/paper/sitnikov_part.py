@@ -88,7 +88,7 @@ def _steps(results: PartResults) -> list[StepRow]:
 
 
 def trajectories(runs: Mapping[str, Orbit], times: Sequence[float | None]) -> list[Claim]:
-    """Return the claims on where the bodies go; ``times`` are those at which neighbouring starts are lost."""
+    """Return the claims on where the bodies go; ``times`` are those at which neighbours are lost."""
     gauss, hbvm, truth = runs["gauss"], runs["hbvm"], runs["truth"]
     apart = np.abs(hbvm.z - truth.z)
     early = float(apart[hbvm.t <= figures.SHOWN].max())
@@ -195,7 +195,7 @@ def dynamics(steps: Sequence[StepRow], growth: Sequence[Growth]) -> list[Claim]:
             f"with e = {sitnikov.E:g} an offset along the axis grows at a rate of {number(at.along[0][1])} "
             f"over {at.along[0][0]} revolutions and {number(at.along[-1][1])} over {at.along[-1][0]}, "
             f"as for a {'regular' if regular else 'chaotic'} orbit. "
-            + (f"This start becomes chaotic at e ≈ {limit:g}. " if limit is not None else "")
+            + (f"This orbit becomes chaotic at e ≈ {limit:g}. " if limit is not None else "")
             + f"Off the axis offsets grow by a factor e every {1 / at.across:.1f} units of time",
             "no" if regular else "holds",
         ),
@@ -271,10 +271,11 @@ def _plainly(results: PartResults) -> str:
         "What HBVM(18,2) with h = 1/2 gets right: the energy, the length of the primaries' axis and with "
         f"it their period (to {number(result.slow)}), a planetoid that stays. What it gets wrong: the "
         f"direction of the ellipses, which turn by {result.turn:.1f} degrees per revolution, the angular "
-        "momentum, and the planetoid's phase: after a few hundred units of time its height has nothing to "
-        "do with the true one. Nor is the method symplectic. A higher order with a smaller step gets all "
+        "momentum, and the planetoid's phase: after a few hundred units of time its height is unrelated "
+        "to the exact one. The method is not symplectic either. A higher order with a smaller step gets "
+        "all "
         f"of it right: HBVM(16,8) with h = 1/8 has z at t = 1500 to {off}, for {share:.2f} "
-        "times the field evaluations of the paper's run (table of the libraries below)."
+        "times the right-hand-side evaluations of the paper's run (table of the libraries below)."
     )
 
 
@@ -295,7 +296,7 @@ def _others(results: PartResults) -> Table:
         "The same run with other integrators",
         "One setting per method, chosen for accuracy by the authors of this bench. Evaluations: of the "
         "vector field, where the library counts them. `hbvm-bench run sitnikov` has all settings, with "
-        "times. Off the axis the trajectory is another one, and its other numbers say nothing.",
+        "times. A run that leaves the axis follows another trajectory, and its other numbers mean nothing.",
     )
 
 

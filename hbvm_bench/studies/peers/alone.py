@@ -88,7 +88,7 @@ class BatchProgram(Program):
     def prepare_batch(
         self, Y0: Array, par: Array | None = None, *, times: Array, t0: float = 0.0
     ) -> Callable[[], Trajectories]:
-        """Set up as many starts at a time as there are lanes; all have the system's own parameters."""
+        """Set up as many trajectories at a time as there are SIMD lanes; all have the system's parameters."""
         n, lanes = len(Y0), self._batch.batch_size
         filled = Y0[np.minimum(np.arange(-(-n // lanes) * lanes), n - 1)]
         parameters = self.system.pack({}) if par is None else np.atleast_2d(par)[0]

@@ -29,7 +29,7 @@ OVERHEAD = 2e-5
 
 DIFFERENCE = 1e-6
 """Most difference of the end states. Measured: 1e-8 for REBOUND, which adds a fixed step to its clock 300,000
-times where our adapter sets it to t0 + n h; 2e-7 for diffrax's LeapfrogMidpoint, whose rounding grows
+times where the adapter sets it to t0 + n h; 2e-7 for diffrax's LeapfrogMidpoint, whose rounding grows
 over 1,500,000 steps; 0 where steps vary."""
 
 A_STEP = 1
@@ -121,7 +121,7 @@ def table(measured: Sequence[Pair]) -> Table:
         rows,
         "Median and quartiles of the ratio of CPU times in each round; the two alternate in one process, "
         f"compiled and set up beforehand; {ALLOWED:g} is allowed, or {OVERHEAD * 1e6:g} microseconds a "
-        "call. The end states of REBOUND's fixed steps differ because it adds up its clock, which our "
+        "call. The end states of REBOUND's fixed steps differ because it adds up its time, which the "
         "adapter sets to whole steps.",
         words=(0, 1),
     )

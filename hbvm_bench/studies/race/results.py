@@ -1,4 +1,4 @@
-"""What a race says, problem by problem: read off the results of its campaign."""
+"""What a race shows, problem by problem, from the results of its campaign."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field

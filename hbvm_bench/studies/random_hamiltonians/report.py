@@ -276,7 +276,8 @@ ENERGY = (
 HOW = (
     f"{COUNT} problems of {len(FAMILIES)} families, drawn from the seed {SEED}: "
     "`hbvm_bench.studies.random_hamiltonians.systems.problem(number)` returns each. Five problems in a row "
-    "have one formula and their own coefficients, start and interval; the intervals of shares take all as "
+    "have one formula and their own coefficients, initial state and interval; the intervals of shares "
+    "take all as "
     f"independent. Every method is asked for {TOLERANCE:g}; `HBVM()`, `Taylor()` and `IAS15` choose their "
     "accuracy themselves and are judged by the same. `atol=1e-06` is SciPy's default. Radau, which takes "
     f"seconds, has {SLOW_DRAWS} of the {DRAWS} problems of each formula. References: two computations in "

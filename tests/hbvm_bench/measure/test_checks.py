@@ -88,7 +88,7 @@ def test_a_run_that_fails_has_no_error_growth_and_says_why():
     assert "ends at t = " in checked.growth["energy"].why
 
 
-def test_an_ensemble_is_measured_against_the_ends_of_its_witnesses():
+def test_an_ensemble_is_measured_against_the_ends_of_its_reference_subset():
     pytest.importorskip("heyoka")
     problem = problems.load("henon_heiles", energy=0.1, t_end=20.0)
     asked = Ensemble(count=40, spread=0.01)
@@ -121,7 +121,7 @@ def test_parameters_of_an_ensemble_vary_by_their_names():
     measured, _ = of_ensemble(problem, Gauss(s=12, h=0.25).compile(problem.system), asked)
     assert measured.complete
     metrics = evaluate(measured)
-    assert metrics["position_end"].value < 1e-14  # 5.7e-16 measured: witnesses have their parameters
+    assert metrics["position_end"].value < 1e-14  # 5.7e-16 measured: the subset has its parameters
     assert metrics["energy_max"].value < 1e-14  # 3.4e-16 measured
     with pytest.raises(InputError, match="unknown parameter of morse"):
         members(problem, Ensemble(count=2, vary=(("depth", 0.1),)))

@@ -58,7 +58,7 @@ def test_the_mean_finds_a_drift_of_known_size():
 
 @pytest.mark.parametrize(("starts", "share", "called"), [(8, "2 %", 2), (3, "5 %", 4)])
 def test_random_walks_are_called_a_drift_as_seldom_as_the_pages_say(starts, share, called):
-    assert drift.told(starts).endswith(f"chance puts {share} there")
+    assert drift.told(starts).endswith(f"chance exceeds this in {share} of all runs")
     # of 100 walks 2 +- 1.4 and 5 +- 2.2 are expected
     assert sum(drift.drifts(drift.mean(T, walks(seed, starts))) is True for seed in range(100)) == called
 

@@ -1,4 +1,4 @@
-"""What is read off the stored integrations is a pure function of them: another rule runs nothing again."""
+"""Readings are pure functions of the stored integrations: another rule runs nothing again."""
 
 from dataclasses import replace
 

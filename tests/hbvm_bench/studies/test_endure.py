@@ -88,10 +88,7 @@ def test_a_small_drift_is_a_drift_all_the_same(tmp_path):
     assert ours.drift.kind == "drift"
     (table, _) = endure.tables(result)
     assert "0 of 16 positive" in str(table.rows[0])
-    assert (
-        "more than 3 of its standard errors from 0; of errors that do not drift, chance puts 0.9 %"
-        in table.note
-    )
+    assert "more than 3 standard errors from 0; without a drift, chance exceeds this in 0.9 %" in table.note
 
 
 def test_the_stored_report_and_the_readme_say_the_same():

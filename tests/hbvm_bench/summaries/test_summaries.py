@@ -164,7 +164,7 @@ def test_powers_of_t_are_told_by_their_exponents_and_not_by_names():
     assert made is not None
     assert made.head == ("method", "bounded", "t^a", "exp t", "drift", "not clear", "a")
     assert made.rows == [("Gauss", "–", "2", "–", "–", "–", "0.54 (0.53 to 0.54)")]
-    assert made.note.endswith("A root mean square over 16 starts is known to ±18 %.")
+    assert made.note.endswith("A root mean square over 16 initial conditions has an uncertainty of ±18 %.")
 
 
 def test_a_growth_from_fewer_than_sixteen_starts_is_not_clear():
