@@ -83,7 +83,7 @@ class Checks(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         Trajectories from which the error growth is found: the problem's own start
         and perturbed ones; see `hbvm_bench.measure.starts`. 0: no growth is fitted.
     reversal : float
-        Share of the span that is integrated there and back again; 0: none.
+        Share of the interval that is integrated there and back again; 0: none.
     chaos : bool
         Whether MEGNO and the largest Lyapunov exponent are computed, by the derivatives of the method's
         steps; of a single trajectory.
@@ -115,7 +115,7 @@ class Ensemble(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 class Goal(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
     """What a campaign asks for before it is run; `hbvm_bench.summaries.goals` gives the verdict.
 
-    Either a number of ours is at most ``at``, or a peer's is at least ``ratio`` times ours: of
+    Either a number of HBVM and Gauss is at most ``at``, or a peer's is at least ``ratio`` times ours: of
     the settings of each that are accurate enough, the one that takes least is compared.
 
     Attributes

@@ -17,7 +17,7 @@ from problems.errors import unknown
 T = TypeVar("T", MethodEntry, Goal)
 
 QUICK_SHARE = 0.1
-"""Of the span, or of an ensemble's trajectories, in a quick run."""
+"""Of the interval, or of an ensemble's trajectories, in a quick run."""
 
 QUICK_ROUNDS = 3
 
@@ -75,7 +75,7 @@ def quick_run(campaign: Campaign) -> Campaign:
 
 
 def _shortened(entry: ProblemEntry) -> ProblemEntry:
-    """Return an entry without a sweep that ends near a tenth of the span, where its reference has a state.
+    """Return an entry without a sweep, ended near a tenth of its interval at a state of its reference.
 
     A problem in a Python file keeps its span: its function need not take another.
     """

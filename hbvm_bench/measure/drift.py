@@ -1,7 +1,7 @@
 """From an error over time to its growth: bounded, a power of t with its interval, exponential or a drift.
 
-Round-off that is unbiased makes the error of a conserved quantity walk at random,
-like t^(1/2) (Brouwer's law); a biased rounding, or a method that does not conserve,
+Round-off that is unbiased makes the error of a conserved quantity a random walk,
+which grows like t^(1/2) (Brouwer's law); a biased rounding, or a method that does not conserve,
 makes it grow like t; a fixed amplitude is what a symplectic method at a step that
 resolves the motion shows before its round-off does. Several can act at once,
 so each is fitted together with a floor, in logarithms, to the rms over windows of
@@ -89,7 +89,7 @@ def _quantile(starts: int) -> float:
 
 
 def false_alarms(starts: int) -> float:
-    """Return in what share of errors without a drift chance puts the mean beyond `limit`."""
+    """Return the share of errors without a drift whose mean exceeds `limit` by chance."""
     from scipy.special import stdtr  # as in _quantile
 
     return 2.0 * float(stdtr(starts - 1, -limit(starts)))
@@ -222,7 +222,7 @@ def _fitted(kind: str, t: Array, values: Array) -> _Fit:
     low, high = float(logs.min()), float(logs.max())
     over = t / t[-1] - 1.0 if kind == "exponential" else np.log(t / t[-1])
 
-    def grown(p: Array) -> Array:  # ln g(t); at the end of the span it is p[1]
+    def grown(p: Array) -> Array:  # ln g(t); at the end of the interval it is p[1]
         return p[1] + p[2] * over
 
     def residual(p: Array) -> Array:

@@ -24,11 +24,11 @@ from hbvm_bench.store.records import Compile, Load, Timing, TimingRound
 from integrators.protocol import MethodBase, Program, Samples, Status
 from problems.problem import Problem
 
-WARM_UP = 0.01  # of the span: everything has run once
+WARM_UP = 0.01  # of the interval: everything has run once
 SLOW = 1.0  # seconds; an integration longer than this needs no second warm-up
 CALIBRATION_LOOPS = 800_000
 ORDER_SEED = 2026
-NOWHERE = 1e-7  # of the span: what a call takes that goes next to nowhere; IAS15 may hang in 1e-9 of it
+NOWHERE = 1e-7  # of the interval: what a call takes that goes next to nowhere; IAS15 may hang in 1e-9 of it
 CALLS = 20
 CLOCKS: dict[str, Callable[[], float]] = {
     "wall": time.perf_counter,
@@ -48,7 +48,7 @@ class Timeable(ABC):
 
     @abstractmethod
     def until(self, share: float) -> "Timeable":
-        """Return a shorter run, over the first ``share`` of the span."""
+        """Return a shorter run, over the first ``share`` of the interval."""
 
     def seconds(
         self, repeats: int = 1, clock: Callable[[], float] = time.perf_counter

@@ -141,7 +141,7 @@ def _names() -> list[str]:
 def gather(stores: Stores) -> Results:
     """Read the stores of one or more runs, or the runs of an archive.
 
-    A case that several runs have is taken from the one that got further with it
+    A case that several runs have is taken from the run that is more complete
     (`hbvm_bench.store.store.progress`).
 
     Raises

@@ -233,7 +233,7 @@ class ErrorGrowth(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
     reached : float
         What the growth alone reached at the end.
     end : float
-        The end of the span, from the start on.
+        The end of the interval, from the start on.
     starts : int
         Trajectories it was found from.
     """
@@ -332,7 +332,7 @@ class Record(msgspec.Struct, frozen=True, kw_only=True):
     role, library, order
         Of the method.
     result : Result
-        What came out.
+        The results.
     timing : Timing or None
         From the serial timing pass.
     limits : Limits

@@ -60,7 +60,7 @@ class Part:
     key: str
     title: str
     runs: Sequence[Task]
-    claims: Callable[["PartResults"], list[Claim]]  # what a publication says and what came out
+    claims: Callable[["PartResults"], list[Claim]]  # published values and computed ones
     blocks: Callable[["PartResults"], list[Maker]]  # what makes each block that is shown
 
     @property
@@ -70,7 +70,7 @@ class Part:
 
 
 class StoredResults(msgspec.Struct, frozen=True):
-    """What came out, by task: the packed result, or why there is none; and by what code."""
+    """Results by task: the packed result, or why there is none; and by what code."""
 
     results: dict[str, bytes]
     failed: dict[str, str]
@@ -113,7 +113,7 @@ class PartResults:
 def claims_of(
     parts: Sequence[tuple[Part, PartResults]], title: str, nav: str, given: str = "paper"
 ) -> Section:
-    """Return every claim of the parts with what was published, called ``given``, and what came out."""
+    """Return every claim of the parts with the published value, called ``given``, and the computed one."""
 
     def claims(part: Part, results: PartResults) -> Claims:
         return Claims([(part.title, part.key, part.claims(results))])

@@ -169,7 +169,7 @@ def goals(result: Endurance) -> list[Verdict]:
 
 
 LAW_POINTS = 40
-FALLS_ON = 30  # a growth is drawn over the last part of the span, from this fraction of it
+FALLS_ON = 30  # a growth is drawn over the last part of the interval, from this fraction of it
 METHOD = """
 The methods run one after the other from each initial condition, in one process on one core. The energy is
 evaluated in double-double arithmetic at whole years, spaced evenly in log time, at ends of steps or in a way

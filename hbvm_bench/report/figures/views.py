@@ -23,7 +23,7 @@ REVOLUTION = 21.46  # of the primaries
 
 
 def axis_motion(problem: Problem, cases: Sequence[Drawn], reference: Reference | None) -> Picture | None:
-    """Draw the planetoid's z over the last part of the span, a panel per family."""
+    """Draw the planetoid's z over the last part of the interval, a panel per family."""
     start = problem.t_end - LAST
     shown = [case for case in cases if case.series["t"].size and case.series["t"][-1] > start]
     if not shown:

@@ -29,7 +29,7 @@ SAMPLES = 3  # runs of each side that are timed
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """What came out of one system.
+    """Results for one system.
 
     Attributes
     ----------

@@ -159,7 +159,7 @@ COMPUTATIONS = {"compute": computing(NAME, lambda quick: parts(quick=quick))}
 
 @block
 def claims(run: Results) -> Section:
-    """Return every published or exact value with what came out."""
+    """Return every published or exact value with the computed one."""
     return claims_of(_parts(run), "Published and exact values", "Values", "published or exact")
 
 

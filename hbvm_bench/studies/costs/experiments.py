@@ -76,7 +76,7 @@ def calls(rounds: int) -> Times:
     problem = problems.load("kepler", t_end=SHORT)
 
     def sample(text: str) -> float:
-        methods = [make_method(text) for _ in range(BATCH)]  # each call has a method that is made anew
+        methods = [make_method(text) for _ in range(BATCH)]  # each call has a new method object
         begun = time.perf_counter()
         for method in methods:
             integrate(problem, method, [SHORT])

@@ -214,7 +214,7 @@ def details(members: Mapping[str, Sequence[Ratio]]) -> Table:
 
 
 def iterations(counted: Mapping[int, Mapping[str, Iterations]], t_end: float) -> Table:
-    """Return the iterations a step by the size of the lattice."""
+    """Return the iterations per step by the size of the lattice."""
     rows = []
     for n, by_method in counted.items():
         cells = []
@@ -224,7 +224,7 @@ def iterations(counted: Mapping[int, Mapping[str, Iterations]], t_end: float) ->
             cells += [a_step, f"{cost.steps}", cost.solver]
         rows.append((f"{n}", *cells))
     heads = [
-        f"{method}, {what}" for method in ON_LATTICES for what in ("iterations a step", "steps", "solver")
+        f"{method}, {what}" for method in ON_LATTICES for what in ("iterations per step", "steps", "solver")
     ]
     return Table(
         "Iterations per step on the discrete nonlinear Schroedinger equation",
@@ -302,7 +302,7 @@ def in_c(found: BesideC) -> Table | Note:
     steps = found.outcomes[OURS].steps
     return Table(
         f"A step of Gauss(8) on Kepler's problem, e = {ECCENTRICITY:g}, beside the same algorithm in C",
-        ("code", "median (ns)", "best", f"× {OURS}", "iterations a step", "energy", "position", "verdict"),
+        ("code", "median (ns)", "best", f"× {OURS}", "iterations per step", "energy", "position", "verdict"),
         rows,
         f"{steps:,} steps of length {STEP:g} in the second-order form, in turn; errors at the end. Both have "
         "the same tables, first stages, stopping rule and compensated update; "

@@ -101,7 +101,8 @@ def _claims(results: PartResults) -> list[Claim]:
             "Under HBVM(4,2) the orbit is in the triangle at all times",
             "50,000 points",
             f"{len(hbvm.t) - 1:,} points, {hbvm.outside} outside; {len(gone['hbvm'])} of the neighbouring "
-            f"initial conditions and {left['hbvm']} of {escaped['hbvm'].size} other initial conditions and energies "
+            f"initial conditions and {left['hbvm']} of {escaped['hbvm'].size} other initial conditions "
+            "and energies "
             "leave, where "
             f"under Gauss {left['gauss']} do",
             "holds" if not (hbvm.left or hbvm.outside or gone["hbvm"] or left["hbvm"]) else "no",

@@ -21,7 +21,7 @@ COMPUTATIONS = {"compute": computing(NAME, lambda quick: PARTS)}
 
 @block
 def claims(run: Results) -> Section:
-    """Return every claim with what the paper gives and what came out."""
+    """Return every claim with the paper's result and the computed one."""
     return claims_of(_parts(run), "Claim, paper, here", "Claims")
 
 

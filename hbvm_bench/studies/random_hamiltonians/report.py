@@ -70,7 +70,7 @@ COMPUTATIONS = {"compute": computing(NAME, lambda quick: parts(quick=quick))}
 
 @block
 def trials(run: Results) -> list[Section]:
-    """Return what came out."""
+    """Return the results."""
     stored = load(NAME, run.beside)
     quick = run.runs[-1].index.campaign.quick
     return sections_of([(part, PartResults(part, stored)) for part in parts(quick=quick)])

@@ -43,7 +43,7 @@ Columns = Mapping[str, tuple[str, Callable[[float], str]]]  # head: name of the 
 
 
 def table(key: str, rows: Mapping[str, MethodRow], columns: Columns, title: str, note: str) -> Table:
-    """Return the table of what came out."""
+    """Return the results as a table."""
 
     def cells(row: MethodRow) -> list[str]:
         return [write(row.numbers[name]) if name in row.numbers else NONE for name, write in columns.values()]
