@@ -58,7 +58,7 @@ def with_rounds(campaign: Campaign, rounds: int | None) -> Campaign:
 
 
 def quick_run(campaign: Campaign) -> Campaign:
-    """Return a campaign over a tenth of each span, with the settings marked for it and fewer rounds.
+    """Return a campaign over a tenth of each interval, with the settings marked for it and fewer rounds.
 
     Of ensembles, a tenth of the trajectories.
     """
@@ -77,7 +77,7 @@ def quick_run(campaign: Campaign) -> Campaign:
 def _shortened(entry: ProblemEntry) -> ProblemEntry:
     """Return an entry without a sweep, ended near a tenth of its interval at a state of its reference.
 
-    A problem in a Python file keeps its span: its function need not take another.
+    A problem in a Python file keeps its interval: its function need not take another.
     """
     if own.is_file(text_of(entry)):
         return entry

@@ -24,7 +24,7 @@ class EnsembleRun(Timeable):
 
     program: Program
     starts: Array  # where the trajectories start, shape (n, dim)
-    problem: Problem  # its parameters and span
+    problem: Problem  # its parameters and interval
     sample: str | None  # how one trajectory meets the end
     par: Array | None = None  # parameters of each, shape (n, n_par); the problem's own by default
 

@@ -42,7 +42,7 @@ class Metric:
     better: Literal["lower"] | None = "lower"  # which way is better; ``None`` where neither is
     scale: Literal["log", "linear"] = "log"  # for axes and number formats
     same_trajectory: bool = False  # excluded where a symmetry guard is violated
-    whole_span: bool = True  # excluded for a case that ended early
+    whole_interval: bool = True  # excluded for a case that ended early
     problem: str | None = None  # the only problem that has it, if it is not for all
 
 
@@ -90,7 +90,7 @@ def _value(metric: Metric, measured: Measured) -> Value:
     if not np.isfinite(number):
         return Value(why="not finite")
     why = ""
-    if metric.whole_span and not measured.complete:
+    if metric.whole_interval and not measured.complete:
         why = f"only to t = {measured.t_stop:.4g}"
     elif metric.same_trajectory:
         why = guard_violation(measured)
@@ -313,7 +313,7 @@ def throughput(m: Measured) -> float | str:
     return seconds if isinstance(seconds, str) else m.trajectories / seconds
 
 
-@metric("compile time", "compile", "s", whole_span=False)
+@metric("compile time", "compile", "s", whole_interval=False)
 def compile_seconds(m: Measured) -> float | str:
     """Seconds of compilation before the first step, from a cache where the library keeps one."""
     compiled = m.timing.compile if m.timing is not None and m.timing.compile else m.compile
@@ -322,19 +322,19 @@ def compile_seconds(m: Measured) -> float | str:
     return "nothing is compiled at run time" if compiled.cached is None else compiled.seconds
 
 
-@metric("compile time, cold", "cold", "s", whole_span=False)
+@metric("compile time, cold", "cold", "s", whole_interval=False)
 def compile_cold(m: Measured) -> float | str:
     """Seconds of compilation with an empty cache."""
     return _compiled(m, cached=False, otherwise="compiled code was in the cache already")
 
 
-@metric("compile time, cached", "cached", "s", whole_span=False)
+@metric("compile time, cached", "cached", "s", whole_interval=False)
 def compile_cached(m: Measured) -> float | str:
     """Seconds to load compiled code from the library's cache."""
     return _compiled(m, cached=True, otherwise="compiled code was not in a cache")
 
 
-@metric("peak memory", "memory", "MiB", whole_span=False)
+@metric("peak memory", "memory", "MiB", whole_interval=False)
 def peak_memory(m: Measured) -> float | str:
     """Largest resident memory of the process that took the samples, libraries included."""
     return "not measured" if m.peak_gib is None else 1024.0 * m.peak_gib
