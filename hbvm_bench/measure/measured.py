@@ -248,7 +248,7 @@ def _position_error(
 
 
 def ahead(problem: Problem, t: Array, y: Array, difference: Array) -> Array:
-    """Return how far in time a run is ahead: its difference from the reference along the field there.
+    """Return how far a run is ahead in time: its difference from the reference along the vector field.
 
     Positions and momenta are each measured in units of their largest value, so that turning
     points, where nothing moves, and the units of either do not matter.
