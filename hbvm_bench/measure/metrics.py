@@ -150,7 +150,7 @@ def energy_rms(m: Measured) -> float | str:
     return float(drift.rms(errors)[-1]) if errors.size else "no further initial conditions were requested"
 
 
-@metric("mean energy error over what is called a drift", "bias", "", scale="linear", same_trajectory=True)
+@metric("mean energy error over the drift threshold", "bias", "", scale="linear", same_trajectory=True)
 def energy_bias(m: Measured) -> float | str:
     """Mean energy error over several initial conditions, in units of the smallest that is called a drift (3
     standard errors; more for few initial conditions): above 1 it is a drift.

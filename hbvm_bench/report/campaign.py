@@ -115,10 +115,13 @@ def conditions(results: Results) -> list[Table]:
     note = (
         "The condition number is the largest relative change of a position at the end over a relative "
         "change of the state at the worst time before, to within a factor of about 2. The last column is "
-        "this number times 1.1e-16: how far that position moves where one state on the way is rounded."
+        "this number times 1.1e-16: the relative change of that position when one state on the way is "
+        "rounded."
     )
     head = ("problem", "end", "condition number", "rounded once")
-    return [Table("How far doubles determine the positions", head, rows, note, words=(0,))] if rows else []
+    return (
+        [Table("Positions that double precision can determine", head, rows, note, words=(0,))] if rows else []
+    )
 
 
 @block

@@ -113,18 +113,17 @@ def summary(records: Sequence[Record]) -> list[str]:
     groups = {key: [r for r in records if group_of(r) == key] for key in GROUPS}
     cases = "1 case" if len(records) == 1 else f"{len(records)} cases"
     counted = {
-        "on": "follow the trajectory to the end",
-        "apart": "reach the end with a large position error",
-        "uncompared": "reach the end, where there is no reference solution",
+        "on": "follow{s} the trajectory to the end",
+        "apart": "reach{es} the end with a large position error",
+        "uncompared": "reach{es} the end, where there is no reference solution",
         "off": "lost the symmetry or the energy",
         "ended": "did not reach the end",
     }
     compared = groups["on"] or groups["apart"]
-    some = [
-        f"{len(groups[key])} {words}"
-        for key, words in counted.items()
-        if groups[key] or (key == "on" and compared)
-    ]
+    some = []
+    for key, words in counted.items():
+        if (count := len(groups[key])) or (key == "on" and compared):
+            some.append(f"{count} {words.format(s='s' * (count == 1), es='es' * (count == 1))}")
     sentences = [f"{cases}: {', '.join(some)}."]
     if ranked := _ranked([r for r in records if reached(r)], "position_end"):
         sentences.append(_best("Smallest position error at the end", ranked, "position_end"))

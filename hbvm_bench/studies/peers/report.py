@@ -138,7 +138,7 @@ def compiled(measured: Sequence[Pair]) -> Table | None:
     if not rows:
         return None
     return Table(
-        "The best of the compilations beside their median",
+        "Best and median of the compilations",
         ("method", "problem", "through", *SPREAD),
         rows,
         "Each compilation, in a fresh process with empty caches, has the median of its samples.",
