@@ -38,7 +38,7 @@ def compared(name: str) -> tuple[Comparison, tuple[float, float] | None]:
     before = busy()
     comparison = import_module(name).compare()
     load = load_between(before, busy())
-    return comparison, None if load is None else (load.others, load.stolen)
+    return comparison, None if load is None else (load.others, load.steal)
 
 
 def measure() -> None:
@@ -71,7 +71,7 @@ def page() -> str:
         from hbvm_bench.report.provenance import measured_on
         from hbvm_bench.store.records import Load
 
-        loads = [Load(others=others, stolen=stolen) for others, stolen in stored["loads"].values()]
+        loads = [Load(others=others, steal=steal) for others, steal in stored["loads"].values()]
         lines.append(measured_on(stored["day"], stored["kernel"], loads))
     if stored["busy"] > BUSY:
         lines.append(

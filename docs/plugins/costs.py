@@ -144,9 +144,9 @@ def _scipy() -> tuple[Problem, Array, list[tuple[str, Run]]]:
         [
             _native(problem, native),
             ("native kernel, numba function", _native(untraced, native)[1]),
-            ("plugin, traced field", run(traced, **ours)),
-            ("plugin, traced field, `every=100`", run(traced, every=100, **ours)),
-            ("plugin, traced field, `t_eval` of 1001 times", run(traced, t_eval=times, **ours)),
+            ("plugin, traced right-hand side", run(traced, **ours)),
+            ("plugin, traced right-hand side, `every=100`", run(traced, every=100, **ours)),
+            ("plugin, traced right-hand side, `t_eval` of 1001 times", run(traced, t_eval=times, **ours)),
             ("plugin, numba function", run(compiled, **ours)),
             ("plugin, numba function, `every=100`", run(compiled, every=100, **ours)),
             ("plugin, Python function", run(python, **ours)),

@@ -81,9 +81,9 @@ class Checks(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     ----------
     starts : int
         Trajectories from which the error growth is found: the problem's own start
-        and perturbed ones; see `hbvm_bench.measure.starts`. 0: no law is sought.
+        and perturbed ones; see `hbvm_bench.measure.starts`. 0: no growth is fitted.
     reversal : float
-        Share of the span that is integrated there and back again; 0: none.
+        Share of the interval that is integrated there and back again; 0: none.
     chaos : bool
         Whether MEGNO and the largest Lyapunov exponent are computed, by the derivatives of the method's
         steps; of a single trajectory.
@@ -115,7 +115,7 @@ class Ensemble(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 class Goal(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
     """What a campaign asks for before it is run; `hbvm_bench.summaries.goals` gives the verdict.
 
-    Either a number of ours is at most ``at``, or a peer's is at least ``ratio`` times ours: of
+    Either a number of HBVM and Gauss is at most ``at``, or a peer's is at least ``ratio`` times ours: of
     the settings of each that are accurate enough, the one that takes least is compared.
 
     Attributes
@@ -139,7 +139,7 @@ class Goal(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
         How many times the peer's error ours may be at most, by metric.
     alone : str
         Why the energy is compared without the position or the phase; without a reason such a
-        goal is void.
+        goal is excluded.
     declared : str
         When it was declared, such as ``"2026-11-20"``, with the time of the day where that matters. A run
         writes there when it first had the goal, unless the file says it.

@@ -20,7 +20,7 @@ from problems.errors import InputError, shown
 from problems.problem import Problem
 
 GOLDEN = (5**0.5 - 1) / 2
-FIRST = 1e-2  # of the span: where samples in log time begin
+FIRST = 1e-2  # of the interval: where samples in log time begin
 
 Positive = Annotated[float, Meta(gt=0, le=1e300)]  # finite
 Count = Annotated[int, Meta(ge=1)]
@@ -41,9 +41,9 @@ class Grid(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
         stored reference belong, so that the position can be compared there.
     first : float, optional
         Where a logarithmic grid begins, after the start, in the problem's unit of
-        time; a hundredth of the span by default.
+        time; a hundredth of the interval by default.
     also : list of float
-        Further times after the start, where they lie within the span.
+        Further times after the start, where they lie within the interval.
     multiple_of : float, optional
         Moves every time between the ends to the nearest multiple of this after the start, such
         as a year, which a step may divide.
@@ -83,14 +83,14 @@ class Grid(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
         Parameters
         ----------
         problem : Problem
-            Has the span.
+            Has the interval.
         h : float, optional
             The method's fixed step, which ``at_steps`` asks for.
 
         Raises
         ------
         problems.errors.InputError
-            For more samples than `problems.limits` allow, or ``first`` beyond the span.
+            For more samples than `problems.limits` allow, or ``first`` beyond the interval.
         """
         times, span = self._shared(problem), problem.t_end - problem.t0
         further = problem.t0 + np.copysign([t for t in self.also if t < abs(span)], span)

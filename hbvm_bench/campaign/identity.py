@@ -207,8 +207,8 @@ def source_digest(method: MethodBase, case: Case) -> str:
     They are those of the method, of the problem, and of `INTEGRATES`, and what these
     import, at their heads or anywhere below, of our packages and of the method's and the problem's own. So
     a row of a peer is not stale because the kernel changed, nor one of ours because of a peer,
-    nor any because of a reference, a metric, the law of a drift, how times are taken, or a report. Comments,
-    docstrings, the layout and what a problem's decorator says do not count. A problem of the user's
+    nor any because of a reference, a metric, a fitted error growth, how times are taken, or a report.
+    Comments, docstrings, the layout and what a problem's decorator says do not count. A problem of the user's
     own has no source: its name holds the digest of its formula.
     """
     spec = parse_spec(case.problem)

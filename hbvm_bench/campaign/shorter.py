@@ -17,7 +17,7 @@ from problems.errors import unknown
 T = TypeVar("T", MethodEntry, Goal)
 
 QUICK_SHARE = 0.1
-"""Of the span, or of an ensemble's trajectories, in a quick run."""
+"""Of the interval, or of an ensemble's trajectories, in a quick run."""
 
 QUICK_ROUNDS = 3
 
@@ -58,7 +58,7 @@ def with_rounds(campaign: Campaign, rounds: int | None) -> Campaign:
 
 
 def quick_run(campaign: Campaign) -> Campaign:
-    """Return a campaign over a tenth of each span, with the settings marked for it and fewer rounds.
+    """Return a campaign over a tenth of each interval, with the settings marked for it and fewer rounds.
 
     Of ensembles, a tenth of the trajectories.
     """
@@ -75,9 +75,9 @@ def quick_run(campaign: Campaign) -> Campaign:
 
 
 def _shortened(entry: ProblemEntry) -> ProblemEntry:
-    """Return an entry without a sweep that ends near a tenth of the span, where its reference has a state.
+    """Return an entry without a sweep, ended near a tenth of its interval at a state of its reference.
 
-    A problem in a Python file keeps its span: its function need not take another.
+    A problem in a Python file keeps its interval: its function need not take another.
     """
     if own.is_file(text_of(entry)):
         return entry

@@ -1,4 +1,4 @@
-"""Answers about what there is and what came out: lists, citations, JSON."""
+"""Answers about what there is: lists, citations, JSON."""
 
 import dataclasses
 import inspect

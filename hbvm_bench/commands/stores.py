@@ -39,7 +39,7 @@ def compare(
         raise typer.Exit(CHANGED)
 
 
-def _print(comparison: comparing.Comparison, console: Console, first: str, second: str) -> None:
+def _print(comparison: comparing.RunComparison, console: Console, first: str, second: str) -> None:
     for where, names in ((first, comparison.only_first), (second, comparison.only_second)):
         for name in names:
             console.print(Text(f"only in {where}: {name}"))

@@ -1,4 +1,4 @@
-"""docs/compile_times.md: how long it takes until the field of a large system runs."""
+"""docs/compile_times.md: how long it takes until the vector field of a large system runs."""
 
 import time
 from collections.abc import Callable
@@ -36,7 +36,7 @@ code grows with the term and not with the number of bodies. Processor seconds of
 - trace: running the function on symbols, and differentiating it;
 - emit: writing the source, `lines` long;
 - compile: by numba, for one state (as SciPy's solvers call it), and of what HBVM calls on {lanes}
-  stages at once (the force of a separable system, otherwise the field).
+  stages at once (the force of a separable system, otherwise the vector field).
 
 """
 
@@ -54,7 +54,7 @@ class Times(NamedTuple):
 
 
 def measure(text: str) -> Times:
-    """Trace, emit and compile the field of a problem, as it prints, from nothing."""
+    """Trace, emit and compile the vector field of a problem, as it prints, from nothing."""
     traced, problem = _seconds(lambda: _traced(text))
     emitted, source = _seconds(lambda: emit.source(problem.system, "field", "numba"))
     scalar, lanes = _seconds(lambda: _compiled(problem))[0], _seconds(lambda: _on_lanes(problem))[0]

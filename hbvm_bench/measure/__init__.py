@@ -1,1 +1,1 @@
-"""From a solution to numbers: metrics, drifts and their laws, checks, ensembles, seconds, and the machine."""
+"""From a solution to numbers: metrics, error growth, checks, ensembles, seconds, and the machine."""

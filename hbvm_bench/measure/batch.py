@@ -54,7 +54,7 @@ def integrate(
     clock: Callable[[], float] = time.perf_counter,
     par: Array | None = None,
 ) -> Members:
-    """Integrate every start, shape (n, dim), to the end of the problem's span, with the parameters of each.
+    """Integrate every start, shape (n, dim), to the end of the interval, with the parameters of each.
 
     The program's ``batch`` is used where it has one, prepared before the clock runs where it can be
     (``prepare_batch``); otherwise one trajectory follows the other and meets the end as ``sample`` says

@@ -186,11 +186,11 @@ def steadiness(measure: Callable[[], float] = calibrate) -> list[Finding]:
     """Time the calibration loop again and again on one core, and tell how steady that is."""
     with machine.staying_on_a_core():
         measure()  # compiled now
-        stolen, wall, busy = timing.stolen(), time.perf_counter(), time.process_time()
+        before, wall, busy = timing.steal_seconds(), time.perf_counter(), time.process_time()
         taken = [measure() for _ in range(CALIBRATIONS)]
         wall, busy = time.perf_counter() - wall, time.process_time() - busy
-        stolen = timing.stolen() - stolen
-    told = [steal(stolen / wall)] if hasattr(psutil.cpu_times(), "steal") else []
+        lost = timing.steal_seconds() - before
+    told = [steal(lost / wall)] if hasattr(psutil.cpu_times(), "steal") else []
     return [scatter(taken), share(busy / wall), *told]
 
 

@@ -1,13 +1,14 @@
-"""From an error over time to its law: bounded, a power of t with its interval, exponential or a drift.
+"""From an error over time to its growth: bounded, a power of t with its interval, exponential or a drift.
 
-Round-off that is unbiased makes the error of a conserved quantity walk at random,
-like t^(1/2) (Brouwer's law); a biased rounding, or a method that does not conserve,
+Round-off that is unbiased makes the error of a conserved quantity a random walk,
+which grows like t^(1/2) (Brouwer's law); a biased rounding, or a method that does not conserve,
 makes it grow like t; a fixed amplitude is what a symplectic method at a step that
-resolves the motion shows before its round-off does. Several laws can act at once,
+resolves the motion shows before its round-off does. Several can act at once,
 so each is fitted together with a floor, in logarithms, to the rms over windows of
-time that are equally long in log t, and over trajectories from perturbed starts.
-The power of t alone does not tell a random walk from one that drifts slowly: the
-mean over the starts is tested against its own scatter before a law is named.
+time that are equally long in log t, and over trajectories from perturbed initial
+conditions. The power of t alone does not tell a random walk from one that drifts
+slowly: the mean over the initial conditions is tested against its own scatter
+before a growth is named.
 
 D. Brouwer, "On the accumulation of errors in numerical integration",
 The Astronomical Journal 46 (1937) 149-153.
@@ -20,7 +21,7 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import ArrayLike, NDArray
 
-from hbvm_bench.store.records import Law
+from hbvm_bench.store.records import ErrorGrowth
 from problems.errors import InputError
 
 Array = NDArray[np.float64]
@@ -31,38 +32,38 @@ FEWEST_ABOVE = 3  # windows in which a growth is above its floor: fewer may be a
 SHORTEST = 1.2  # decades
 NOISE = 0.05  # of the logarithm: no fit is taken to be better than this
 CONFIDENCE = 0.95
-STANDARD_ERRORS = 3.0  # by which the mean over the starts must be away from 0 to be called a drift
+STANDARD_ERRORS = 3.0  # from 0, beyond which a mean is called a drift
 EVIDENCE = 6.0  # by which the criterion of a growth must beat a bound: strong evidence
 STEEPEST = 12.0  # powers of t, and e-foldings times 40, that are searched
 
-LAWS: dict[str, str] = {
+KINDS: dict[str, str] = {
     "bounded": "stays within a bound",
     "power": "grows like a power of t",
     "exponential": "grows like exp(t)",
-    "drift": "drifts: the mean over the starts is not 0",
+    "drift": "drifts: the mean over the initial conditions is not 0",
 }
-CURVES = [law for law in LAWS if law != "drift"]  # that are fitted; a drift is told by the mean
+CURVES = [kind for kind in KINDS if kind != "drift"]  # that are fitted; a drift is told by the mean
 
 
-def curve(law: Law, t: ArrayLike) -> Array:
-    """Return a law as fitted at positive times since the start, shape (n,); NaN where there is none."""
+def curve(growth: ErrorGrowth, t: ArrayLike) -> Array:
+    """Return the fitted growth at positive times since the start, shape (n,); NaN where there is none."""
     times = np.asarray(t, dtype=np.float64)
-    if law.law is None:
+    if growth.kind is None:
         return np.full(times.shape, math.nan)
-    if law.law == "exponential":
-        growth = math.nan if law.growth is None else law.growth
-        grown = np.exp(np.minimum(growth * (times - law.end), 0.0))
+    if growth.kind == "exponential":
+        rate = math.nan if growth.exponential_rate is None else growth.exponential_rate
+        grown = np.exp(np.minimum(rate * (times - growth.end), 0.0))
     else:
-        slope = 0.0 if law.law == "bounded" else math.nan if law.slope is None else law.slope
-        grown = (times / law.end) ** slope
-    return np.hypot(law.floor, law.reached * grown)
+        slope = 0.0 if growth.kind == "bounded" else math.nan if growth.slope is None else growth.slope
+        grown = (times / growth.end) ** slope
+    return np.hypot(growth.floor, growth.reached * grown)
 
 
-def drifts(law: Law) -> bool | None:
-    """Whether the mean is more than `limit` standard errors from 0; ``None`` for one start."""
-    if law.mean is None or law.mean_error is None:
+def drifts(growth: ErrorGrowth) -> bool | None:
+    """Whether the mean is more than `limit` standard errors from 0; ``None`` for one trajectory."""
+    if growth.mean is None or growth.mean_error is None:
         return None
-    return abs(law.mean) > limit(law.starts) * law.mean_error
+    return abs(growth.mean) > limit(growth.starts) * growth.mean_error
 
 
 def rms(errors: ArrayLike) -> Array:
@@ -76,41 +77,45 @@ def rms(errors: ArrayLike) -> Array:
 def limit(starts: int) -> float:
     """Return how many standard errors a mean over ``starts`` may be from 0 and not be called a drift.
 
-    `STANDARD_ERRORS`, or Student's 95 % quantile where few starts make that larger.
+    `STANDARD_ERRORS`, or Student's 95 % quantile where few trajectories make that larger.
     """
     return max(STANDARD_ERRORS, _quantile(starts))
 
 
 def _quantile(starts: int) -> float:
-    from scipy.special import stdtrit  # few cases ask for a law, and every process would load it
+    from scipy.special import stdtrit  # few cases ask for a fit, and every process would load it
 
     return float(stdtrit(starts - 1, 0.5 + CONFIDENCE / 2))
 
 
 def false_alarms(starts: int) -> float:
-    """Return in what share of errors without a drift chance puts the mean beyond `limit`."""
+    """Return the share of errors without a drift whose mean exceeds `limit` by chance."""
     from scipy.special import stdtr  # as in _quantile
 
     return 2.0 * float(stdtr(starts - 1, -limit(starts)))
 
 
 def told(starts: int) -> str:
-    """Return when a mean over so many starts, at least two, is called a drift, and how often wrongly."""
+    """Return when a mean over at least two initial conditions is called a drift, and how often wrongly."""
     return (
-        f"A drift is reported where the mean over the {starts} starts is more than {limit(starts):.3g} of "
-        "its standard errors from 0; of errors that do not drift, chance puts "
-        f"{100.0 * false_alarms(starts):.1g} % there"
+        f"A drift is reported where the mean over the {starts} initial conditions is more than "
+        f"{limit(starts):.3g} standard errors from 0; without a drift, chance exceeds this in "
+        f"{100.0 * false_alarms(starts):.1g} % of all runs"
     )
 
 
 def uncertainty(starts: int) -> str:
-    """Return how well so many starts know a root mean square; nothing for one start."""
+    """Return the uncertainty of a root mean square over initial conditions; nothing for one."""
     share = 100.0 / math.sqrt(2.0 * starts) if starts > 1 else 0.0
-    return f" A root mean square over {starts} starts is known to ±{share:.0f} %." if share else ""
+    return (
+        f" A root mean square over {starts} initial conditions has an uncertainty of ±{share:.0f} %."
+        if share
+        else ""
+    )
 
 
-def mean(t: ArrayLike, errors: ArrayLike) -> Law:
-    """Return the mean over the starts of what the errors have grown by at the end, without a law.
+def mean(t: ArrayLike, errors: ArrayLike) -> ErrorGrowth:
+    """Return the mean growth of the errors to the end over the initial conditions, without a fit.
 
     The offset of a trajectory, its mean over the first window of time, is taken off:
     what the evaluation of an invariant adds throughout is no drift. End less begin is
@@ -125,15 +130,17 @@ def mean(t: ArrayLike, errors: ArrayLike) -> Law:
     error = math.sqrt(float(np.sum((ends - value) ** 2)) / (n * (n - 1))) if n > 1 else math.inf
     span = float(times[-1] - times[first].mean())
     rate, low, high = (_finite(bound / span) for bound in (value, *_interval(value, error, n)))
-    mean_law = Law(mean=value, mean_error=_finite(error), positive=int(np.sum(ends > 0.0)), starts=n)
-    return replace(mean_law, rate=rate, rate_low=low, rate_high=high, end=float(times[-1]))
+    mean_growth = ErrorGrowth(
+        mean=value, mean_error=_finite(error), positive=int(np.sum(ends > 0.0)), starts=n
+    )
+    return replace(mean_growth, rate=rate, rate_low=low, rate_high=high, end=float(times[-1]))
 
 
-def fit(t: ArrayLike, errors: ArrayLike, *, signed: bool = True) -> Law:
-    """Find the law of an error.
+def fit(t: ArrayLike, errors: ArrayLike, *, signed: bool = True) -> ErrorGrowth:
+    """Find how an error grows with time.
 
-    Signed errors that grow by a power of t are called a drift where the mean over the starts is
-    one (`drifts`). Samples that are not finite end the series; fewer than two leave no law.
+    Signed errors that grow by a power of t are called a drift where the mean over the initial conditions
+    is one (`drifts`). Samples that are not finite end the series; fewer than two leave no growth.
 
     Parameters
     ----------
@@ -146,9 +153,9 @@ def fit(t: ArrayLike, errors: ArrayLike, *, signed: bool = True) -> Law:
 
     Returns
     -------
-    Law
-        Intervals from leaving out one start at a time, or from the scatter about the fit
-        where there are fewer than three starts.
+    ErrorGrowth
+        Intervals from leaving out one trajectory at a time, or from the scatter about the fit
+        where there are fewer than three.
 
     Raises
     ------
@@ -159,15 +166,15 @@ def fit(t: ArrayLike, errors: ArrayLike, *, signed: bool = True) -> Law:
     good = np.isfinite(rows).all(axis=0)
     size = good.size if good.all() else int(np.argmin(good))
     if size < 2:
-        return Law(why="the error is not finite from the first samples on", starts=len(rows))
+        return ErrorGrowth(why="the error is not finite from the first samples on", starts=len(rows))
     times, rows = times[:size], rows[:, :size]
-    fitted = mean(times, rows) if signed else Law(end=float(times[-1]), starts=len(rows))
+    fitted = mean(times, rows) if signed else ErrorGrowth(end=float(times[-1]), starts=len(rows))
     if size < good.size:
         fitted = replace(fitted, why=f"only to t = {times[-1]:.4g}, where the error is last finite")
     middle, label = _windows(times)
     values = _windowed(rows, label)
     if not np.any(values):
-        return replace(fitted, law="bounded", slope=0.0, slope_low=0.0, slope_high=0.0)
+        return replace(fitted, kind="bounded", slope=0.0, slope_low=0.0, slope_high=0.0)
     kept = values > 0.0
     decades = math.log10(times[-1] / times[0])
     if kept.sum() < FEWEST_WINDOWS or decades < SHORTEST:
@@ -176,23 +183,23 @@ def fit(t: ArrayLike, errors: ArrayLike, *, signed: bool = True) -> Law:
             "of time"
         )
         return replace(fitted, why=why, floor=float(values[kept].min()))
-    fits = {law: _fitted(law, middle[kept], values[kept]) for law in CURVES}
+    fits = {kind: _fitted(kind, middle[kept], values[kept]) for kind in CURVES}
     slope, low, high = _slope(times, rows, fits["power"])
-    law = min(CURVES, key=lambda name: fits[name].score)
-    if fits[law].score > fits["bounded"].score - EVIDENCE or fits[law].above < FEWEST_ABOVE:
-        law = "bounded"
-    if drifts(fitted) and law == "power":
-        fits["drift"], law = fits["power"], "drift"
-    floor = math.exp(fits[law].parameters[0])
+    kind = min(CURVES, key=lambda name: fits[name].score)
+    if fits[kind].score > fits["bounded"].score - EVIDENCE or fits[kind].above < FEWEST_ABOVE:
+        kind = "bounded"
+    if drifts(fitted) and kind == "power":
+        fits["drift"], kind = fits["power"], "drift"
+    floor = math.exp(fits[kind].parameters[0])
     return replace(
         fitted,
-        law=law,
+        kind=kind,
         slope=slope,
         slope_low=_finite(low),
         slope_high=_finite(high),
         floor=floor,
-        growth=_finite(_rate_of_growth(times, rows, floor)) if law == "exponential" else None,
-        reached=0.0 if law == "bounded" else math.exp(fits[law].parameters[1]),
+        exponential_rate=_finite(_rate_of_growth(times, rows, floor)) if kind == "exponential" else None,
+        reached=0.0 if kind == "bounded" else math.exp(fits[kind].parameters[1]),
     )
 
 
@@ -204,18 +211,18 @@ class _Fit:
     above: int  # windows in which the growth has passed the floor
 
 
-def _fitted(law: str, t: Array, values: Array) -> _Fit:
+def _fitted(kind: str, t: Array, values: Array) -> _Fit:
     """Fit ln sqrt(floor^2 + g(t)^2) to ln of the values by least squares."""
     from scipy.optimize import least_squares  # as in _quantile
 
     logs = np.log(values)
     n = logs.size
-    if law == "bounded":
+    if kind == "bounded":
         return _Fit((float(np.mean(logs)),), _score(logs - np.mean(logs), 1), 0.0, 0)
     low, high = float(logs.min()), float(logs.max())
-    over = t / t[-1] - 1.0 if law == "exponential" else np.log(t / t[-1])
+    over = t / t[-1] - 1.0 if kind == "exponential" else np.log(t / t[-1])
 
-    def grown(p: Array) -> Array:  # ln g(t); at the end of the span it is p[1]
+    def grown(p: Array) -> Array:  # ln g(t); at the end of the interval it is p[1]
         return p[1] + p[2] * over
 
     def residual(p: Array) -> Array:
@@ -224,8 +231,8 @@ def _fitted(law: str, t: Array, values: Array) -> _Fit:
     # The floor lies not far below the least value: below that it has no effect and no meaning.
     bounds = [(low - 3.0, high + 1e-9), (low - 3.0, high + 3.0)]
     guesses = [[low - 1.0, float(logs[-1])], [low, float(logs[-1])]]
-    bounds.append((0.0, STEEPEST) if law == "power" else (0.0, 40.0 * STEEPEST))
-    steep = (0.5, 1.5) if law == "power" else (2.0, 20.0)
+    bounds.append((0.0, STEEPEST) if kind == "power" else (0.0, 40.0 * STEEPEST))
+    steep = (0.5, 1.5) if kind == "power" else (2.0, 20.0)
     guesses = [[*guess, value] for guess in guesses for value in steep]
     lower, upper = (np.array(side) for side in zip(*bounds, strict=True))
     best = min(
@@ -255,7 +262,7 @@ def _score(residual: NDArray[np.floating], parameters: int) -> float:
 
 
 def _slope(t: Array, rows: Array, whole: _Fit) -> tuple[float, float, float]:
-    """Return the power of t and its interval, by the jackknife over starts where there are three."""
+    """Return the power of t and its interval, by the jackknife over trajectories where there are three."""
     slope = whole.parameters[2]
     starts = len(rows)
     if starts < 3:

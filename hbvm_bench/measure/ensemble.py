@@ -24,7 +24,7 @@ class EnsembleRun(Timeable):
 
     program: Program
     starts: Array  # where the trajectories start, shape (n, dim)
-    problem: Problem  # its parameters and span
+    problem: Problem  # its parameters and interval
     sample: str | None  # how one trajectory meets the end
     par: Array | None = None  # parameters of each, shape (n, n_par); the problem's own by default
 
@@ -37,7 +37,7 @@ class EnsembleRun(Timeable):
         return cls(program, starts, problem, method.to_end, par)
 
     def until(self, share: float) -> "EnsembleRun":
-        """Return the run of a few of the trajectories, over the first ``share`` of the span."""
+        """Return the run of a few of the trajectories, over the first ``share`` of the interval."""
         end = self.problem.t0 + share * (self.problem.t_end - self.problem.t0)
         problem = changed(self.problem, self.problem.y0, self.problem.par, end)
         par = None if self.par is None else self.par[:WARM_UP]

@@ -12,7 +12,7 @@ from hbvm_bench.campaign.entries import Checks, Ensemble
 from hbvm_bench.measure import drift
 from hbvm_bench.measure.starts import members
 from hbvm_bench.reference.solutions import Reference
-from hbvm_bench.store.records import Compile, Counters, Law, Result, Timing
+from hbvm_bench.store.records import Compile, Counters, ErrorGrowth, Result, Timing
 from integrators.protocol import Status
 from problems import emit
 from problems.analysis import invariants
@@ -53,8 +53,8 @@ class Measured:
     # of an ensemble more than one: ``y`` has the end of each, and its errors are those against its own start
     trajectories: int = 1
     peak_gib: float | None = None  # largest resident memory of the process
-    laws: dict[str, Law] = field(default_factory=dict)  # how the error of each invariant grows
-    # what the laws were found from: ``t`` of shape (n,), and the errors by invariant, of shape (starts, n)
+    growth: dict[str, ErrorGrowth] = field(default_factory=dict)  # how the error of each invariant grows
+    # what that was fitted to: ``t`` of shape (n,), and the errors by invariant, of shape (starts, n)
     drift: dict[str, Array] = field(default_factory=dict)
     reversal: float | str = "not asked for"  # distance from the start after integrating there and back
     # MEGNO, the exponent and its interval by the names of `hbvm_bench.measure.chaos`, or why there is none
@@ -120,21 +120,21 @@ def measure(
     )
 
 
-def with_laws(measured: Measured, asked: Checks) -> Measured:
-    """Return what was measured with the law of each invariant's drift, where a campaign asks for them."""
+def with_growth(measured: Measured, asked: Checks) -> Measured:
+    """Return what was measured with the growth of each invariant's error, where a campaign asks for them."""
     if not asked.starts:
         return measured
     if not measured.complete:
-        law = Law(why=f"the trajectory ends at t = {measured.t_stop:.4g}", starts=1)
-        return replace(measured, laws=dict.fromkeys(measured.problem.system.invariants, law))
+        unknown = ErrorGrowth(why=f"the trajectory ends at t = {measured.t_stop:.4g}", starts=1)
+        return replace(measured, growth=dict.fromkeys(measured.problem.system.invariants, unknown))
     rows = {name: values for name, values in measured.drift.items() if name != "t"}
-    laws = {
+    growth = {
         name: drift.fit(measured.drift["t"], values, signed=name == "energy")
         if values.shape[1]
-        else Law(why="no samples")
+        else ErrorGrowth(why="no samples")
         for name, values in rows.items()
     }
-    return replace(measured, laws=laws)
+    return replace(measured, growth=growth)
 
 
 def _named(series: Series, prefix: str) -> Series:
@@ -149,7 +149,7 @@ def _reversal(problem: Problem, result: Result, series: Series) -> float | str:
 
 
 def _drift(problem: Problem, series: Series) -> Series:
-    """Return the errors that a law is found from, shape (starts, n), and their times since the start."""
+    """Return the errors that a growth is fitted to, shape (starts, n), and their times since the start."""
     if "starts.y0" not in series:
         return _named(series, "drift.")  # of an archive, which has these errors instead of the states
     t = np.abs(series["t"] - problem.t0)
@@ -248,7 +248,7 @@ def _position_error(
 
 
 def ahead(problem: Problem, t: Array, y: Array, difference: Array) -> Array:
-    """Return how far in time a run is ahead: its difference from the reference along the field there.
+    """Return how far a run is ahead in time: its difference from the reference along the vector field.
 
     Positions and momenta are each measured in units of their largest value, so that turning
     points, where nothing moves, and the units of either do not matter.

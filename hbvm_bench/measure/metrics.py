@@ -41,8 +41,8 @@ class Metric:
     description: str  # one sentence for readers
     better: Literal["lower"] | None = "lower"  # which way is better; ``None`` where neither is
     scale: Literal["log", "linear"] = "log"  # for axes and number formats
-    same_trajectory: bool = False  # void where a symmetry guard is violated
-    whole_span: bool = True  # void for a case that ended early
+    same_trajectory: bool = False  # excluded where a symmetry guard is violated
+    whole_interval: bool = True  # excluded for a case that ended early
     problem: str | None = None  # the only problem that has it, if it is not for all
 
 
@@ -82,7 +82,7 @@ def evaluate(measured: Measured) -> dict[str, Value]:
 
 
 def _value(metric: Metric, measured: Measured) -> Value:
-    """Return a metric of a case, void or without a number where it has to be."""
+    """Return a metric of a case, excluded or without a number where it has to be."""
     with np.errstate(all="ignore"):
         number = metric.function(measured)
     if isinstance(number, str):
@@ -90,11 +90,11 @@ def _value(metric: Metric, measured: Measured) -> Value:
     if not np.isfinite(number):
         return Value(why="not finite")
     why = ""
-    if metric.whole_span and not measured.complete:
+    if metric.whole_interval and not measured.complete:
         why = f"only to t = {measured.t_stop:.4g}"
     elif metric.same_trajectory:
         why = guard_violation(measured)
-    return Value(value=float(number), void=bool(why), why=why)
+    return Value(value=float(number), excluded=bool(why), why=why)
 
 
 def find(key: str) -> Metric:
@@ -134,13 +134,13 @@ def invariants_max(m: Measured) -> float | str:
 @metric("power of t of the energy error", "slope", "", scale="linear", same_trajectory=True)
 def energy_slope(m: Measured) -> float | str:
     """Power of t with which the energy error grows, over initial conditions: 1/2 for a random walk."""
-    return _of_law(m, "slope")
+    return _of_growth(m, "slope")
 
 
 @metric("mean energy drift", "drift", "1/time", better=None, scale="linear", same_trajectory=True)
 def energy_rate(m: Measured) -> float | str:
     """Mean signed relative energy error per unit of time, over several initial conditions."""
-    return _of_law(m, "rate")
+    return _of_growth(m, "rate")
 
 
 @metric("energy error at the end, over initial conditions", "energy, rms", "relative", same_trajectory=True)
@@ -150,15 +150,15 @@ def energy_rms(m: Measured) -> float | str:
     return float(drift.rms(errors)[-1]) if errors.size else "no further initial conditions were requested"
 
 
-@metric("mean energy error over what is called a drift", "bias", "", scale="linear", same_trajectory=True)
+@metric("mean energy error over the drift threshold", "bias", "", scale="linear", same_trajectory=True)
 def energy_bias(m: Measured) -> float | str:
     """Mean energy error over several initial conditions, in units of the smallest that is called a drift (3
     standard errors; more for few initial conditions): above 1 it is a drift.
     """
-    law = m.laws.get("energy")
-    if law is None or law.mean is None or not law.mean_error:
+    growth = m.growth.get("energy")
+    if growth is None or growth.mean is None or not growth.mean_error:
         return "a mean needs several initial conditions"
-    return abs(law.mean) / (drift.limit(law.starts) * law.mean_error)
+    return abs(growth.mean) / (drift.limit(growth.starts) * growth.mean_error)
 
 
 @metric("smallest energy drift within the interval", "smallest drift", "1/time", same_trajectory=True)
@@ -166,10 +166,10 @@ def energy_rate_least(m: Measured) -> float | str:
     """The drift nearest to 0 in the 95 % interval over several initial conditions; 0 if that
     contains 0.
     """
-    law = m.laws.get("energy")
-    if law is None or law.rate_low is None or law.rate_high is None:
+    growth = m.growth.get("energy")
+    if growth is None or growth.rate_low is None or growth.rate_high is None:
         return "an interval needs several initial conditions"
-    return max(law.rate_low, -law.rate_high, 0.0)
+    return max(growth.rate_low, -growth.rate_high, 0.0)
 
 
 @metric("time-reversal error", "reversal", "length", same_trajectory=True)
@@ -313,7 +313,7 @@ def throughput(m: Measured) -> float | str:
     return seconds if isinstance(seconds, str) else m.trajectories / seconds
 
 
-@metric("compile time", "compile", "s", whole_span=False)
+@metric("compile time", "compile", "s", whole_interval=False)
 def compile_seconds(m: Measured) -> float | str:
     """Seconds of compilation before the first step, from a cache where the library keeps one."""
     compiled = m.timing.compile if m.timing is not None and m.timing.compile else m.compile
@@ -322,19 +322,19 @@ def compile_seconds(m: Measured) -> float | str:
     return "nothing is compiled at run time" if compiled.cached is None else compiled.seconds
 
 
-@metric("compile time, cold", "cold", "s", whole_span=False)
+@metric("compile time, cold", "cold", "s", whole_interval=False)
 def compile_cold(m: Measured) -> float | str:
     """Seconds of compilation with an empty cache."""
     return _compiled(m, cached=False, otherwise="compiled code was in the cache already")
 
 
-@metric("compile time, cached", "cached", "s", whole_span=False)
+@metric("compile time, cached", "cached", "s", whole_interval=False)
 def compile_cached(m: Measured) -> float | str:
     """Seconds to load compiled code from the library's cache."""
     return _compiled(m, cached=True, otherwise="compiled code was not in a cache")
 
 
-@metric("peak memory", "memory", "MiB", whole_span=False)
+@metric("peak memory", "memory", "MiB", whole_interval=False)
 def peak_memory(m: Measured) -> float | str:
     """Largest resident memory of the process that took the samples, libraries included."""
     return "not measured" if m.peak_gib is None else 1024.0 * m.peak_gib
@@ -352,13 +352,13 @@ def _of_chaos(m: Measured, name: str, place: int = 0) -> float | str:
     return value if isinstance(value, str) else float(value[place])
 
 
-def _of_law(m: Measured, name: str) -> float | str:
-    """Return a number of the law of the energy's error."""
-    law = m.laws.get("energy")
-    if law is None:
+def _of_growth(m: Measured, name: str) -> float | str:
+    """Return a number of the growth of the energy error."""
+    growth = m.growth.get("energy")
+    if growth is None:
         return "no error growth was fitted"
-    number = getattr(law, name)
-    return law.why or "the samples do not determine it" if number is None else number
+    number = getattr(growth, name)
+    return growth.why or "the samples do not determine it" if number is None else number
 
 
 def _compiled(m: Measured, *, cached: bool, otherwise: str) -> float | str:

@@ -4,13 +4,14 @@ The series are::
 
     t, y                         times and states of the samples; of an ensemble the end of each trajectory
     extra.NAME                   histories that the stepper kept
-    starts.y0, starts.y          further starts of a drift study that reached the end, shape (n, dim), and
+    starts.y0, starts.y          initial conditions of a drift study that reached the end, shape (n, dim),
                                  their states at the same times, shape (n, times, dim)
     reversal.y                   the state after integrating there and back, shape (1, dim)
-    witness.index, .high, .low   trajectories of an ensemble whose ends are known in 128 bits, and these ends
+    witness.index, .high, .low   the reference subset: trajectories of an ensemble whose ends are known in
+                                 128 bits, and these ends
 
-Errors, laws and metrics are pure functions of this; see `hbvm_bench.measure.reading`. A change here, or in
-what this module imports, makes every stored integration stale; a change there none.
+Errors, their growth and metrics are pure functions of this; see `hbvm_bench.measure.reading`. A change
+here, or in what this module imports, makes every stored integration stale; a change there none.
 """
 
 from dataclasses import replace
@@ -97,7 +98,7 @@ def of_solution(solution: Solution) -> tuple[Result, Series]:
 
 
 def beside(solution: Solution, program: Program, asked: Checks) -> tuple[Value, Series]:
-    """Integrate what is looked at beside a trajectory: further starts, and the way back.
+    """Integrate what is looked at beside a trajectory: further initial conditions, and the way back.
 
     Returned is, beside the series, why there is no way back; the value is computed when it is read.
     """

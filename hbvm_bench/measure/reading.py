@@ -1,4 +1,4 @@
-"""What is read off the stored integrations: errors, laws and metrics, pure functions of what is in the store.
+"""Readings: errors, their growth and metrics, computed from the stored series by pure functions.
 
 A reading is kept beside the records, in ``readings/``, until the record, its reference, or a source that
 makes it changes; a change makes it anew and runs no integration.
@@ -21,7 +21,7 @@ from problems.errors import InputError
 
 
 def records(store: Store | Archive) -> list[Record]:
-    """Return the records of a run as `Store.records` does, with what is read off them.
+    """Return the records of a run as `Store.records` does, with their readings.
 
     Raises
     ------
@@ -29,10 +29,10 @@ def records(store: Store | Archive) -> list[Record]:
         If the directory holds no run.
     """
     stored = store.records()
-    return stored if isinstance(store, Archive) else [kept(store, record) for record in stored]
+    return stored if isinstance(store, Archive) else [up_to_date(store, record) for record in stored]
 
 
-def kept(store: Store, record: Record) -> Record:
+def up_to_date(store: Store, record: Record) -> Record:
     """Return a record of a store with its reading: the one that is kept, or a new one, which is then kept."""
     if record.result.outcome not in ("ok", "stalled") or record.result.metrics:
         return record
@@ -48,7 +48,7 @@ def kept(store: Store, record: Record) -> Record:
         reading = Reading(
             metrics=reread.result.metrics,
             violation=reread.result.violation,
-            laws=reread.result.laws,
+            growth=reread.result.growth,
             digest=digest,
         )
         with suppress(InputError, OSError):  # where nothing can be written it is read again next time
@@ -57,21 +57,21 @@ def kept(store: Store, record: Record) -> Record:
 
 
 def read(record: Record, series: Series) -> Record:
-    """Return a record with its laws, its metrics, and whether its trajectory is another than asked for."""
+    """Return a record with its error growth and metrics, and whether it follows another trajectory."""
     case_measured = case_of(record, series)
     if case_measured is None:
         return record
-    case_measured = measured.with_laws(case_measured, record.case.checks)
+    case_measured = measured.with_growth(case_measured, record.case.checks)
     reading = Reading(
         metrics=metrics.evaluate(case_measured),
         violation=metrics.guard_violation(case_measured),
-        laws=case_measured.laws,
+        growth=case_measured.growth,
     )
     return with_reading(record, reading)
 
 
 def case_of(record: Record, series: Series) -> Measured | None:
-    """Return what is measured on a case, without laws; ``None`` where it has no trajectory.
+    """Return what is measured on a case, without error growth; ``None`` where it has no trajectory.
 
     A case that was read by an earlier version, which kept too little to read it again, has none either.
     """
@@ -98,7 +98,7 @@ def is_read(series: Series) -> bool:
 def with_reading(record: Record, reading: Reading) -> Record:
     """Return a record with a reading in the place of its own."""
     result = msgspec.structs.replace(
-        record.result, metrics=reading.metrics, violation=reading.violation, laws=reading.laws
+        record.result, metrics=reading.metrics, violation=reading.violation, growth=reading.growth
     )
     return msgspec.structs.replace(record, result=result)
 

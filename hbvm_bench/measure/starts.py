@@ -1,4 +1,4 @@
-"""Starts near a problem's own: for the law of a drift, and for ensembles."""
+"""Initial conditions near a problem's own: for the growth of errors, and for ensembles."""
 
 from typing import Any
 
@@ -13,11 +13,11 @@ from problems.problem import Problem
 Array = NDArray[np.float64]
 
 PERTURBATION = 1e-6
-"""Relative size of the changes of the starts from which a law is found."""
+"""Relative size of the changes of the initial conditions from which a growth is fitted."""
 
 
 def scaled(problem: Problem, count: int) -> Array:
-    """Return starts for the law of a drift, shape (count, dim); the first is the problem's own.
+    """Return initial conditions for the growth of errors, shape (count, dim); the first is the problem's own.
 
     All positions are multiplied by one number and all momenta by another (a state without either: by one),
     both within `PERTURBATION` of 1: round-off decorrelates, and a start that is symmetric, at rest or
@@ -31,7 +31,7 @@ def scaled(problem: Problem, count: int) -> Array:
 
 
 def members(problem: Problem, asked: Ensemble) -> tuple[Array, Array]:
-    """Return the starts and the parameters of an ensemble, shapes (n, dim) and (n, n_par).
+    """Return the initial conditions and the parameters of an ensemble, shapes (n, dim) and (n, n_par).
 
     The first is the problem's own. Every number of the start, and each parameter that varies, is
     multiplied by 1 + spread x, where x runs evenly through [-1, 1] in all of them together: the Weyl

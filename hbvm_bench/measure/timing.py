@@ -24,11 +24,11 @@ from hbvm_bench.store.records import Compile, Load, Timing, TimingRound
 from integrators.protocol import MethodBase, Program, Samples, Status
 from problems.problem import Problem
 
-WARM_UP = 0.01  # of the span: everything has run once
+WARM_UP = 0.01  # of the interval: everything has run once
 SLOW = 1.0  # seconds; an integration longer than this needs no second warm-up
 CALIBRATION_LOOPS = 800_000
 ORDER_SEED = 2026
-NOWHERE = 1e-7  # of the span: what a call takes that goes next to nowhere; IAS15 may hang in 1e-9 of it
+NOWHERE = 1e-7  # of the interval: what a call takes that goes next to nowhere; IAS15 may hang in 1e-9 of it
 CALLS = 20
 CLOCKS: dict[str, Callable[[], float]] = {
     "wall": time.perf_counter,
@@ -48,7 +48,7 @@ class Timeable(ABC):
 
     @abstractmethod
     def until(self, share: float) -> "Timeable":
-        """Return a shorter run, over the first ``share`` of the span."""
+        """Return a shorter run, over the first ``share`` of the interval."""
 
     def seconds(
         self, repeats: int = 1, clock: Callable[[], float] = time.perf_counter
@@ -63,7 +63,7 @@ class Timeable(ABC):
 
 
 @dataclass(frozen=True, eq=False)
-class Run(Timeable):
+class SingleRun(Timeable):
     """A whole integration that returns its end state only."""
 
     program: Program
@@ -74,7 +74,7 @@ class Run(Timeable):
     sample: str | None  # how the end time is met; see `integrators.protocol.MethodBase.to_end`
 
     @classmethod
-    def compiled(cls, problem: Problem, method: MethodBase, program: Program | None = None) -> "Run":
+    def compiled(cls, problem: Problem, method: MethodBase, program: Program | None = None) -> "SingleRun":
         """Return the run of a method, compiled if it is not yet, which meets its end as its library does."""
         program = method.compile(problem.system) if program is None else program
         return cls(program, problem.y0, problem.par, problem.t0, problem.t_end, method.to_end)
@@ -86,7 +86,7 @@ class Run(Timeable):
         samples = stepper.advance(end, sample=self.sample)
         return clock() - start, samples
 
-    def until(self, share: float) -> "Run":
+    def until(self, share: float) -> "SingleRun":
         return replace(self, t_end=self.t0 + share * (self.t_end - self.t0))
 
 
@@ -272,20 +272,20 @@ def busy() -> tuple[float, float, float, float]:
     """
     all_, own = psutil.cpu_times(), os.times()
     spent = sum(getattr(all_, name, 0.0) for name in ("user", "nice", "system", "irq", "softirq"))
-    return spent, stolen(), sum(own[:4]), time.monotonic()
+    return spent, steal_seconds(), sum(own[:4]), time.monotonic()
 
 
-def stolen() -> float:
+def steal_seconds() -> float:
     """Return the steal time of all cores in seconds; 0 where the system does not tell it."""
     return getattr(psutil.cpu_times(), "steal", 0.0)
 
 
 def load_between(before: tuple[float, ...], after: tuple[float, ...]) -> Load | None:
     """Return what else the machine did between two looks at `busy`; ``None`` where they are one."""
-    all_, stolen, own, wall = (b - a for a, b in zip(before, after, strict=True))
+    all_, steal, own, wall = (b - a for a, b in zip(before, after, strict=True))
     if wall <= 0.0:
         return None
-    return Load(others=round(max(all_ - own, 0.0) / wall, 3), stolen=round(stolen / wall, 3))
+    return Load(others=round(max(all_ - own, 0.0) / wall, 3), steal=round(steal / wall, 3))
 
 
 def calibrate(clock: Callable[[], float] = time.perf_counter) -> float:

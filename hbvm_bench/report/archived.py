@@ -12,12 +12,13 @@ from hbvm_bench.report.document import Document, Section
 from hbvm_bench.report.figures.canvas import Picture
 from hbvm_bench.store import archive
 from hbvm_bench.store.archive import Archive, Contents, Drawing
-from hbvm_bench.store.kept import Kept
 from hbvm_bench.store.records import Record
 from hbvm_bench.store.store import Store
+from hbvm_bench.store.stored_run import StoredRun
 from hbvm_bench.summaries.table import Table
 from problems.errors import InputError
 
+FORMER_HEADS = {"law": "growth"}  # of the tables of figures, in archives that are older
 PLACE = "problem-"  # how the anchors of the sections begin whose figures are of series
 
 
@@ -60,10 +61,10 @@ def joined(store: Store, before: Path) -> list[Store | Archive]:
 
 
 def _machine(records: Sequence[Record]) -> dict[str, str | int]:
-    return Kept.machine_of(records)
+    return StoredRun.machine_of(records)
 
 
-def _table(store: Store | Archive) -> archive.Table:
+def _table(store: Store | Archive) -> archive.RunColumns:
     index, records = store.index(), reading.records(store)
     store.add_known()
     named = tuple(index.campaign.page.series)
@@ -105,6 +106,7 @@ def _drawing(place: str, picture: Picture) -> Drawing:
 
 def _picture(drawing: Drawing) -> Picture:
     head, *rows = [tuple(row) for row in drawing.numbers] or [()]
+    head = tuple(FORMER_HEADS.get(name, name) for name in head)
     return Picture(
         drawing.key,
         drawing.title,

@@ -15,6 +15,7 @@ from hbvm_bench.report import provenance, words
 from hbvm_bench.report.archived import PLACE
 from hbvm_bench.report.document import (
     Block,
+    CaseTable,
     Commands,
     Details,
     Files,
@@ -23,13 +24,12 @@ from hbvm_bench.report.document import (
     Section,
     attempt,
 )
-from hbvm_bench.report.document import Results as Rows
 from hbvm_bench.report.figures.profiles import profiles
 from hbvm_bench.report.page import DRAWN_CASES, Results, block
 from hbvm_bench.report.problem import ProblemPart, part
 from hbvm_bench.store import archive
 from hbvm_bench.store.records import Record
-from hbvm_bench.summaries import accuracies, compilations, goals, laws, needs, outcomes
+from hbvm_bench.summaries import accuracies, compilations, goals, growth, needs, outcomes
 from hbvm_bench.summaries.points import by_family, family_of
 from hbvm_bench.summaries.rows import Task, columns, grouped_by, tasks
 from hbvm_bench.summaries.table import Table
@@ -115,10 +115,13 @@ def conditions(results: Results) -> list[Table]:
     note = (
         "The condition number is the largest relative change of a position at the end over a relative "
         "change of the state at the worst time before, to within a factor of about 2. The last column is "
-        "this number times 1.1e-16: how far that position moves where one state on the way is rounded."
+        "this number times 1.1e-16: the relative change of that position when one state on the way is "
+        "rounded."
     )
     head = ("problem", "end", "condition number", "rounded once")
-    return [Table("How far doubles determine the positions", head, rows, note, words=(0,))] if rows else []
+    return (
+        [Table("Positions that double precision can determine", head, rows, note, words=(0,))] if rows else []
+    )
 
 
 @block
@@ -160,7 +163,7 @@ def _overall(results: Results, *, several: bool) -> list[Block]:
     blocks = attempt(
         ("which integrator for which need", partial(needs.table, records)),
         ("which integrator on which problem", partial(_outcomes, records)),
-        ("the growth of the energy error", partial(laws.table, records)),
+        ("the growth of the energy error", partial(growth.table, records)),
         ("performance profiles", partial(profiles, records, numbers)),
     )
     return [Section(title, blocks, "overview", nav="Over all problems" * several)] if blocks else []
@@ -200,10 +203,10 @@ def what_came_out(results: Results) -> Section:
     said = [(item.short, item.unit or "–", f"{item.label}. {item.description}") for item in METRICS.values()]
     meaning = Table("", ("column", "unit", "meaning"), said, words=(0, 1, 2))
     blocks += [
-        Rows(columns(records), [item.ranked for item in parts], results.look),
+        CaseTable(columns(records), [item.ranked for item in parts], results.look),
         Details("What the columns mean", [meaning]),
     ]
-    return Section("What came out", blocks, "results", nav="Results")
+    return Section("Results", blocks, "results", nav="Results")
 
 
 @block

@@ -86,7 +86,7 @@ class Ranked:
 
 
 @dataclass(frozen=True)
-class Results:
+class CaseTable:
     """Cases as rows, which a page sorts and filters."""
 
     columns: Sequence[Metric]
@@ -145,7 +145,7 @@ class Section:
 
 
 Block = (
-    str | Note | Notice | Items | Commands | Claims | Results | Files | Failed | Details | Section
+    str | Note | Notice | Items | Commands | Claims | CaseTable | Files | Failed | Details | Section
     | Table | Picture | Links
 )  # fmt: skip
 

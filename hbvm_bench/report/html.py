@@ -19,9 +19,9 @@ from hbvm_bench.report.archived import PLACE
 from hbvm_bench.report.document import (
     VERDICTS,
     Block,
+    CaseTable,
     Document,
     Links,
-    Results,
     Section,
     is_call,
     pieces,
@@ -107,7 +107,7 @@ def pages(document: Document, folder: Path | None = None) -> dict[str, str]:
         for section in document.blocks
         if isinstance(section, Section) and section.key.startswith(PLACE)
     ]
-    table = next((block for block in document.walk() if isinstance(block, Results)), None)
+    table = next((block for block in document.walk() if isinstance(block, CaseTable)), None)
     if table is None or len(sections) <= TOGETHER or sum(map(len, _rows_by_problem(table))) <= ONE_PAGE:
         return {"index.html": page(document, out=out)}
     names = {section.key: f"{section.key}.html" for section in sections}
@@ -135,7 +135,7 @@ def pages(document: Document, folder: Path | None = None) -> dict[str, str]:
     return texts
 
 
-def _rows_by_problem(table: Results) -> list[list[Row]]:
+def _rows_by_problem(table: CaseTable) -> list[list[Row]]:
     return [[row for _, rows in problem.groups for row in rows] for problem in table.problems]
 
 
@@ -219,7 +219,7 @@ def bar(metric: Metric, cell: Cell, row: Row) -> int | None:
     """Return how many percent of a double's digits an error leaves right; ``None`` where not an error."""
     error = metric.better == "lower" and metric.unit in ("relative", "length")
     number = row.record.result.metrics[metric.key].value
-    if not error or cell.void or number is None:
+    if not error or cell.excluded or number is None:
         return None
     right = DIGITS if number == 0 else -math.log10(number)
     return round(100 * min(max(right / DIGITS, 0.0), 1.0))

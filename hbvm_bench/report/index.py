@@ -13,18 +13,19 @@ from hbvm_bench.report.markdown import plain, printed
 from hbvm_bench.report.page import document
 from hbvm_bench.store import archive
 from hbvm_bench.store.files import write_all
-from hbvm_bench.store.kept import Kept
 from hbvm_bench.store.records import Record
+from hbvm_bench.store.stored_run import StoredRun
 from hbvm_bench.summaries import outcomes
 from hbvm_bench.summaries.table import Table
 from problems.errors import InputError
 
 DOCUMENTS = ("README.md", "report.md")  # what a report is read from
 LEAD = (
-    "Every report is written by the command that it names; nothing in it is by hand. A text (`report.md` or "
+    "Every report is written by the command that it names; nothing in it is written by hand. A text "
+    "(`report.md` or "
     "`README.md`) with its figures is committed beside the results that it is made from. The pages, "
     "`NAME/index.html` with all figures and all rows, are drawn from these results by `make pages`, without "
-    "running anything; git ignores them, but for sitnikov's."
+    "running anything; git ignores them, except that of sitnikov."
 )
 WIDTH = 360  # pixels of a thumbnail
 LONGEST = 400  # characters of a description
@@ -92,7 +93,8 @@ def conditions(directory: Path) -> Table:
         ("report", "date", "processor", "kernel", "other processes", "host"),
         rows,
         "Kernel: the first digits of the digest of its sources, without comments. Other processes, host: "
-        "what they used of a core while the times of each problem were taken, the least to the most.",
+        "the share of a core that they used while the times of each problem were taken, from the "
+        "smallest to the largest.",
         words=range(6),
         key="conditions",
     )
@@ -120,11 +122,11 @@ def not_measured(directory: Path) -> list[str]:
 def _kinds(path: Path) -> list[str]:
     """Return the kinds of processor whose results an archive holds; none without an archive."""
     runs = [run.records() for run in archive.read(path)] if path.is_file() else []
-    return [machine.kind(Kept.machine_of(records)) for records in runs if records]
+    return [machine.kind(StoredRun.machine_of(records)) for records in runs if records]
 
 
 def _measured(records: Sequence[Record]) -> tuple[str, ...]:
-    described = Kept.machine_of(records)
+    described = StoredRun.machine_of(records)
     names = dict.fromkeys((str(described.get("processor", "unknown")), machine.kind(described)))
     kernels = sorted({record.kernel[: provenance.DIGITS] for record in records if record.kernel})
     return (

@@ -38,7 +38,7 @@ def printed(block: Block, level: int = 2, shown: Collection[str] = ()) -> str:
             return "\n".join(f"    {one_line(line)}" for line in block.text.splitlines())
         case blocks.Claims():
             return _claims(block, heading)
-        case blocks.Results():
+        case blocks.CaseTable():
             return _results(block, level)
         case blocks.Files():
             links = ", ".join(f"[{path.rpartition('/')[2]}]({path})" for path in block.files)
@@ -88,7 +88,7 @@ def _claims(block: blocks.Claims, heading: str) -> str:
     return "\n\n".join(parts)
 
 
-def _results(block: blocks.Results, level: int) -> str:
+def _results(block: blocks.CaseTable, level: int) -> str:
     parts = []
     several = len(block.problems) > 1
     head = ("#", "method", "settings", *(words(metric.short) for metric in block.columns))
@@ -116,7 +116,7 @@ def _results(block: blocks.Results, level: int) -> str:
 
 
 def row_cells(columns: Sequence[Metric], row: Row) -> list[str]:
-    """Return the cells of a row: void ones in brackets, times with their quartiles."""
+    """Return the cells of a row: excluded ones in brackets, times with their quartiles."""
     cells = []
     for metric in columns:
         text = row.shown(metric.key)

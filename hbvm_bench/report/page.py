@@ -23,9 +23,9 @@ from hbvm_bench.report.document import Block, Document, attempt
 from hbvm_bench.report.figures.canvas import Picture
 from hbvm_bench.report.figures.style import Look, looks
 from hbvm_bench.store.archive import Archive, Drawing
-from hbvm_bench.store.kept import Kept
 from hbvm_bench.store.records import Record
 from hbvm_bench.store.store import Store, again, damage, progress
+from hbvm_bench.store.stored_run import StoredRun
 from hbvm_bench.summaries.points import family_of
 from problems.errors import InputError, unknown
 
@@ -55,7 +55,7 @@ class Results:
 
     Attributes
     ----------
-    runs : list of Kept
+    runs : list of StoredRun
         What was asked for, and the records of each.
     records : list of Record
         Of all cases; of one that several runs have, that of the run that got further with it.
@@ -67,7 +67,7 @@ class Results:
         What a study keeps beside its cases, by name.
     """
 
-    runs: list[Kept]
+    runs: list[StoredRun]
     records: list[Record]
     series: dict[str, Series]
     drawings: Sequence[Drawing] = ()
@@ -85,15 +85,15 @@ class Results:
         name = family_of if self.page.colours == "family" else lambda record: record.case.method
         return looks([*map(name, self.records), *self.page.looks])
 
-    def missing(self, run: Kept) -> list[Case]:
+    def missing(self, run: StoredRun) -> list[Case]:
         """Return the cases of a run that have no result yet."""
         there = {record.id for record in self.records}
         return [case for number, case in run.index.listed() if number not in there]
 
     @cached_property
-    def by_processor(self) -> dict[str, list[Kept]]:
+    def by_processor(self) -> dict[str, list[StoredRun]]:
         """The runs by the kind of processor, by its name."""
-        runs_of: dict[str, list[Kept]] = {}
+        runs_of: dict[str, list[StoredRun]] = {}
         for run in self.runs:
             runs_of.setdefault(machine.kind(run.machine), []).append(run)
         return dict(sorted(runs_of.items()))
@@ -141,7 +141,7 @@ def _names() -> list[str]:
 def gather(stores: Stores) -> Results:
     """Read the stores of one or more runs, or the runs of an archive.
 
-    A case that several runs have is taken from the one that got further with it
+    A case that several runs have is taken from the run that is more complete
     (`hbvm_bench.store.store.progress`).
 
     Raises
@@ -153,7 +153,7 @@ def gather(stores: Stores) -> Results:
     runs = []
     furthest: dict[str, tuple[Record, Store | Archive]] = {}
     for store, index in zip(stores, indices, strict=True):
-        runs.append(Kept(index=index, records=reading.records(store)))
+        runs.append(StoredRun(index=index, records=reading.records(store)))
         for record in runs[-1].records:
             if record.id not in furthest or progress(record) > progress(furthest[record.id][0]):
                 furthest[record.id] = (record, store)

@@ -74,10 +74,8 @@ def part(
     drawn = [case for case in cases if "t" in case.series and case.series["t"].size]
     known_ends = ensemble is not None and any(number_of(record, "position_end") for record in records)
     ends = min(ensemble.count, WITNESSES) if ensemble is not None and known_ends else 0
-    witnesses = [words.WITNESSES.format(ends)] if ends else []
-    summary = attempt(
-        (f"the summary of {text}", lambda: Items([*words.summary(records), *witnesses], "cards"))
-    )
+    subset = [words.REFERENCE_SUBSET.format(ends)] if ends else []
+    summary = attempt((f"the summary of {text}", lambda: Items([*words.summary(records), *subset], "cards")))
     wrong = attempt(
         (f"the shortcomings of HBVM and Gauss on {text}", lambda: Items(words.shortcomings(records)))
     )

@@ -133,4 +133,4 @@ def _fitting(shown: list[Metric], lines: Sequence[Row], width: int) -> list[Metr
 
 def _cell(row: Row, key: str) -> Text:
     cell = row.cells.get(key)
-    return Text(row.shown(key), style="dim" if cell is None or cell.void else "")
+    return Text(row.shown(key), style="dim" if cell is None or cell.excluded else "")

@@ -25,7 +25,7 @@ RIGHT = {"position_end": 1e-8, "energy_max": 1e-13}
 BEST = 3  # of them
 SHORTEST_RUN = 1e-6  # seconds; no whole integration takes less
 
-WITNESSES = (
+REFERENCE_SUBSET = (
     "The position errors are the largest of {} trajectories, taken evenly from all, whose ends are known in "
     "128 bits, relative to the largest distance of a body from the origin at these ends."
 )
@@ -64,7 +64,8 @@ the part that was integrated are excluded.
 TIMES = (
     "Times are those of whole integrations without output, compiled beforehand, with one thread on one "
     "core, in a pass of their own with no other case running. {visits} {sample} The table gives the median "
-    "and the quartiles; all samples are in the store. Compilation is stated apart. Each library integrates "
+    "and the quartiles; all samples are in the store. Compile times are given separately. Each library "
+    "integrates "
     "to the end as its own documentation describes; `hbvm-bench run peers` measures what the bench adds to "
     "its time."
 )
@@ -112,18 +113,17 @@ def summary(records: Sequence[Record]) -> list[str]:
     groups = {key: [r for r in records if group_of(r) == key] for key in GROUPS}
     cases = "1 case" if len(records) == 1 else f"{len(records)} cases"
     counted = {
-        "on": "follow the trajectory to the end",
-        "apart": "reach the end with a large position error",
-        "uncompared": "reach the end, where there is no reference solution",
+        "on": "follow{s} the trajectory to the end",
+        "apart": "reach{es} the end with a large position error",
+        "uncompared": "reach{es} the end, where there is no reference solution",
         "off": "lost the symmetry or the energy",
         "ended": "did not reach the end",
     }
     compared = groups["on"] or groups["apart"]
-    some = [
-        f"{len(groups[key])} {words}"
-        for key, words in counted.items()
-        if groups[key] or (key == "on" and compared)
-    ]
+    some = []
+    for key, words in counted.items():
+        if (count := len(groups[key])) or (key == "on" and compared):
+            some.append(f"{count} {words.format(s='s' * (count == 1), es='es' * (count == 1))}")
     sentences = [f"{cases}: {', '.join(some)}."]
     if ranked := _ranked([r for r in records if reached(r)], "position_end"):
         sentences.append(_best("Smallest position error at the end", ranked, "position_end"))

@@ -61,7 +61,7 @@ def time_cases(
     with machine.leaving_a_core() as core:
         for number, group in _missing(cases, store, plan, here):
             loaded = [record for case in group if (record := store.load(case.id)) is not None]
-            records = [reading.kept(store, record) for record in loaded]
+            records = [reading.up_to_date(store, record) for record in loaded]
             if len(records) < len(group) or group[0].id in failed:
                 continue
             tell(number, group[0])
@@ -161,7 +161,7 @@ def _joined(parts: Sequence[Timing]) -> Timing:
         rounds=rounds,
         why="; ".join(dict.fromkeys(part.why for part in parts if part.why)),
         call=median([part.call for part in parts if part.call is not None] or [math.nan]) if rounds else None,
-        load=max(loads, key=lambda load: max(load.others, load.stolen), default=None),
+        load=max(loads, key=lambda load: max(load.others, load.steal), default=None),
     )
 
 

@@ -21,7 +21,7 @@ from hbvm_bench.campaign.file import Case, Limits, TimingPlan
 from hbvm_bench.campaign.identity import Resolved, fixed_step, resolve
 from hbvm_bench.measure import batch, ensemble, machine, memory, raw, timing
 from hbvm_bench.measure.raw import Series
-from hbvm_bench.measure.timing import Run, Timeable
+from hbvm_bench.measure.timing import SingleRun, Timeable
 from hbvm_bench.run import ending
 from hbvm_bench.store.files import atomic
 from hbvm_bench.store.records import Result, Timing
@@ -187,7 +187,7 @@ def _time(request: Request, plan: TimingPlan, directory: Path) -> list[Timing]:
 def _run(resolved: Resolved) -> Timeable:
     problem, method, program = resolved.problem, resolved.method, _compiled(resolved)
     if (asked := resolved.case.ensemble) is None:
-        return Run.compiled(problem, method, program)
+        return SingleRun.compiled(problem, method, program)
     return ensemble.EnsembleRun.compiled(problem, method, program, asked)
 
 

@@ -9,7 +9,7 @@ The file is JSON, compressed by ``xz``::
     drawings            figures of the other series: these have a thousand times the numbers that are shown
     beside              what a study keeps beside its cases
 
-What was read off the series is in the columns, as it was read when the file was written.
+What was computed from the series is in the columns, as it was read when the file was written.
 """
 
 import lzma
@@ -70,7 +70,7 @@ class Array(msgspec.Struct, frozen=True, kw_only=True):
         return np.ascontiguousarray(numbers).view(">f8").astype(np.float64).reshape(self.shape)
 
 
-class Table(msgspec.Struct, frozen=True, kw_only=True):
+class RunColumns(msgspec.Struct, frozen=True, kw_only=True):
     """One run: what was asked for, its records column by column, and those series that its page keeps."""
 
     index: Index
@@ -82,7 +82,7 @@ class Table(msgspec.Struct, frozen=True, kw_only=True):
 class Contents(msgspec.Struct, frozen=True, kw_only=True):
     """A whole file."""
 
-    runs: list[Table]
+    runs: list[RunColumns]
     drawings: list[Drawing] = []
     beside: dict[str, Any] = {}
     schema: int = SCHEMA
@@ -91,7 +91,7 @@ class Contents(msgspec.Struct, frozen=True, kw_only=True):
 class Archive:
     """A run that can be read as a `Store` is; it has drawings in the place of series."""
 
-    def __init__(self, path: Path, table: Table, contents: Contents) -> None:
+    def __init__(self, path: Path, table: RunColumns, contents: Contents) -> None:
         self.directory = path
         self._kept_beside = contents.beside
         self.drawings = contents.drawings
@@ -130,13 +130,13 @@ class Archive:
         return self._index
 
     def records(self) -> list[Record]:
-        """Return the records with what was read off them, in the order of the campaign."""
+        """Return the records with what was computed from them, in the order of the campaign."""
         return self._records
 
 
 def table(
     index: Index, records: Sequence[Record], series: Mapping[str, Mapping[str, NDArray[np.float64]]]
-) -> Table:
+) -> RunColumns:
     """Return records, as `hbvm_bench.measure.reading` reads them, column by column, with series of them."""
     kept = {
         key: {name: Array.packed(v) for name, v in named.items()} for key, named in series.items() if named
@@ -144,7 +144,7 @@ def table(
     rows = [msgspec.to_builtins(record) for record in records]
     columns = {name: [row[name] for row in rows] for name in Record.__struct_fields__}
     known = [own.beside(make_problem(text)) for text in dict.fromkeys(r.case.problem for r in records)]
-    return Table(
+    return RunColumns(
         index=index, columns=columns, series=kept, beside=[entry for entry in known if entry != own.Beside()]
     )
 

@@ -17,8 +17,8 @@ T = TypeVar("T")
 def merge(runs: Sequence[Store], out: Store) -> tuple[int, int, int]:
     """Write the cases of several runs into a new one.
 
-    A case that several runs have, by its id, is taken from the one that got further with
-    it (`hbvm_bench.store.store.progress`). The same case under other versions or sources has
+    A case that several runs have, by its id, is taken from the run that is more
+    complete (`hbvm_bench.store.store.progress`). The same case under other versions or sources has
     another id and stays a row of its own.
 
     Returns

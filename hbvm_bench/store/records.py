@@ -61,14 +61,14 @@ class Value(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     ----------
     value : float or None
         The number; ``None`` where there is none.
-    void : bool
+    excluded : bool
         Whether the number exists but must not be compared.
     why : str
-        Why there is no number, or why it is void.
+        Why there is no number, or why it is excluded.
     """
 
     value: float | None = None
-    void: bool = False
+    excluded: bool = msgspec.field(default=False, name="void")
     why: str = ""
 
     def __post_init__(self) -> None:
@@ -78,7 +78,7 @@ class Value(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     @property
     def counts(self) -> bool:
         """Whether the number may be compared with other cases'."""
-        return self.value is not None and not self.void
+        return self.value is not None and not self.excluded
 
 
 class Compile(msgspec.Struct, frozen=True, kw_only=True):
@@ -134,12 +134,12 @@ class Load(msgspec.Struct, frozen=True, kw_only=True):
     ----------
     others : float
         Other processes of this machine, over all cores.
-    stolen : float
+    steal : float
         Steal time: CPU time that the machine's host gave to others.
     """
 
     others: float
-    stolen: float
+    steal: float = msgspec.field(name="stolen")
 
 
 class Timing(msgspec.Struct, frozen=True, kw_only=True):
@@ -207,44 +207,44 @@ class Counters(msgspec.Struct, frozen=True, kw_only=True):
     solver: str | None = None
 
 
-class Law(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """The law that an invariant's error follows in time; numbers that do not exist are ``None``.
+class ErrorGrowth(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """How an invariant's error grows with time; numbers that do not exist are ``None``.
 
     Attributes
     ----------
-    law : str or None
-        A key of `hbvm_bench.measure.drift.LAWS`; ``None`` where the samples do not say.
+    kind : str or None
+        A key of `hbvm_bench.measure.drift.KINDS`; ``None`` where the samples do not say.
     why : str
-        Why there is no law.
+        Why there is none.
     slope, slope_low, slope_high : float or None
         Power of t, with its 95 % interval.
     floor : float
         What is there before the growth.
-    growth : float or None
+    exponential_rate : float or None
         Rate of an exponential, in 1/t.
     rate, rate_low, rate_high : float or None
-        Mean signed drift per unit of time, with its 95 % interval over the starts;
+        Mean signed drift per unit of time, with its 95 % interval over the initial conditions;
         for the energy only, the other invariants' errors have no sign.
     mean, mean_error : float or None
-        Mean over the starts at the end, without the offset of each
-        (`hbvm_bench.measure.drift.mean`); its standard error with several starts only.
+        Mean over the initial conditions at the end, without the offset of each
+        (`hbvm_bench.measure.drift.mean`); its standard error where there are several.
     positive : int or None
-        How many of the starts end above 0.
+        How many of the errors end above 0.
     reached : float
         What the growth alone reached at the end.
     end : float
-        The end of the span, from the start on.
+        The end of the interval, from the start on.
     starts : int
         Trajectories it was found from.
     """
 
-    law: str | None = None
+    kind: str | None = msgspec.field(default=None, name="law")
     why: str = ""
     slope: float | None = None
     slope_low: float | None = None
     slope_high: float | None = None
     floor: float = 0.0
-    growth: float | None = None
+    exponential_rate: float | None = msgspec.field(default=None, name="growth")
     rate: float | None = None
     rate_low: float | None = None
     rate_high: float | None = None
@@ -272,8 +272,8 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
         Where the integration stopped.
     counters, compile
         What the integration cost.
-    metrics, laws, violation
-        What is read off the series: metrics, how the error of each invariant grows, and where a symmetry
+    metrics, growth, violation
+        What is computed from the series: metrics, how the error of each invariant grows, and where a symmetry
         guard says that this is another trajectory than the one asked for. Empty as a worker returns it and
         as the store keeps it; `hbvm_bench.measure.reading` fills them.
     warnings : list of str
@@ -297,7 +297,7 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
     counters: Counters = Counters()
     metrics: dict[str, Value] = {}
     compile: Compile | None = None
-    laws: dict[str, Law] = {}
+    growth: dict[str, ErrorGrowth] = msgspec.field(default_factory=dict, name="laws")
     trajectories: int = 1
     warnings: list[str] = []
     reversal: Value = Value(why="not asked for")
@@ -306,7 +306,7 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Reading(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """What was read off the series of a case; see `Result` for the first three.
+    """What was computed from the series of a case; see `Result` for the first three.
 
     Attributes
     ----------
@@ -316,7 +316,7 @@ class Reading(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
 
     metrics: dict[str, Value] = {}
     violation: str = ""
-    laws: dict[str, Law] = {}
+    growth: dict[str, ErrorGrowth] = msgspec.field(default_factory=dict, name="laws")
     digest: str = msgspec.field(default="", name="by")
 
 
@@ -332,7 +332,7 @@ class Record(msgspec.Struct, frozen=True, kw_only=True):
     role, library, order
         Of the method.
     result : Result
-        What came out.
+        The results.
     timing : Timing or None
         From the serial timing pass.
     limits : Limits

@@ -5,7 +5,7 @@
     DIR/campaign.json        what was asked for: the campaign and the ids of its cases
     DIR/cases/<id>.json      one record per case
     DIR/cases/<id>.npz       its series, as the integration gave them; see `hbvm_bench.measure.raw`
-    DIR/readings/<id>.json   what was read off them last; see `hbvm_bench.measure.reading`
+    DIR/readings/<id>.json   what was computed from them last; see `hbvm_bench.measure.reading`
     DIR/problems/<name>.json what is known of a problem that does not come with the package, or its reference
 
 A file is complete or not there, so that the store is also the cache: a rerun
@@ -159,14 +159,14 @@ class Store:
             return b""
 
     def reading(self, case_id: str) -> Reading | None:
-        """Return what was read off a case last, or ``None``."""
+        """Return what was computed from a case last, or ``None``."""
         try:
             return decoded(self._reading_path(case_id).read_bytes(), Reading)
         except (OSError, ValueError):
             return None
 
     def keep_reading(self, case_id: str, reading: Reading) -> None:
-        """Store what was read off a case; it is made again from the series where it is lost."""
+        """Store what was computed from a case; it is made again from the series where it is lost."""
         path = self._reading_path(case_id)
         path.parent.mkdir(exist_ok=True)
         with atomic(path) as temporary:
@@ -356,22 +356,22 @@ def damage(record: Record, series: Mapping[str, NDArray[np.float64]], dim: int) 
     if t.ndim != 1 or y.shape != (t.size, dim):
         return f"t has the shape {t.shape} and y {y.shape}"
     if "starts.y0" in series and series["starts.y0"].shape[1:] != (dim,):
-        return f"its further starts have the shape {series['starts.y0'].shape}"
+        return f"its further initial conditions have the shape {series['starts.y0'].shape}"
     states = (len(series.get("starts.y0", ())), t.size, dim)
     if "starts.y0" in series and getattr(series.get("starts.y"), "shape", ()) != states:
-        return "the states of its further starts do not belong to its times"
+        return "the states of its further trajectories do not belong to its times"
     if "reversal.y" in series and series["reversal.y"].shape != (1, dim):
         return f"its way back ends in the shape {series['reversal.y'].shape}"
     sizes = {"chaos.megno": (1,), "chaos.exponent": (3,)}
     if wrong := [name for name, size in sizes.items() if name in series and series[name].shape != size]:
         return f"{wrong[0]} has the shape {series[wrong[0]].shape}"
-    witnesses = series.get("witness.index", np.empty(0))
-    if not np.all((witnesses >= 0) & (witnesses < t.size)) or any(
-        getattr(series.get(f"witness.{part}"), "shape", ()) != (witnesses.size, dim)
+    subset = series.get("witness.index", np.empty(0))
+    if not np.all((subset >= 0) & (subset < t.size)) or any(
+        getattr(series.get(f"witness.{part}"), "shape", ()) != (subset.size, dim)
         for part in ("high", "low")
-        if witnesses.size
+        if subset.size
     ):
-        return "its witnesses are not among its trajectories"
+        return "its reference subset is not among its trajectories"
     if wrong := [name for name, length in lengths.items() if series[name].shape != (length,)]:
         return f"{wrong[0]} has the shape {series[wrong[0]].shape}, beside {lengths[wrong[0]]} times"
     if drifts := [name for name in series if name.startswith("drift.")]:

@@ -1,4 +1,4 @@
-"""HBVM with default settings against heyoka's Taylor method: no setting on our side."""
+"""HBVM with default settings against heyoka's Taylor method."""
 
 import textwrap
 from collections.abc import Mapping, Sequence
@@ -17,8 +17,8 @@ from hbvm_bench.report.figures.canvas import Picture, new, picture, styled
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
 from hbvm_bench.report.figures.style import INK, MUTED, PAPER, base
 from hbvm_bench.report.page import Results, block
-from hbvm_bench.store.kept import Kept
 from hbvm_bench.store.records import Record
+from hbvm_bench.store.stored_run import StoredRun
 from hbvm_bench.summaries import compilations, outcomes, standings
 from hbvm_bench.summaries.goals import Verdict, verdicts
 from hbvm_bench.summaries.points import accurate
@@ -89,7 +89,7 @@ def campaign(names: Sequence[str], rounds: int | None = None) -> Campaign:
     return with_rounds(chosen(load(NAME), list(names)), rounds)
 
 
-def head_to_heads(run: Kept) -> list[HeadToHead]:
+def head_to_heads(run: StoredRun) -> list[HeadToHead]:
     """Return the comparison on each problem."""
     campaign, result = run.index.campaign, []
     judged = {verdict.entry.use: verdict for verdict in verdicts(campaign, run.records)}
@@ -130,7 +130,7 @@ def kinds(results: Results) -> list[Section]:
     ]
 
 
-def _run(run: Kept) -> list[Block]:
+def _run(run: StoredRun) -> list[Block]:
     libraries = ", ".join(f"{name} {number}" for name, number in run.versions.items())
     return [
         Note(
@@ -150,7 +150,7 @@ def _run(run: Kept) -> list[Block]:
     ]
 
 
-def ratios(results: Mapping[str, Sequence[Kept]]) -> Table:
+def ratios(results: Mapping[str, Sequence[StoredRun]]) -> Table:
     """Return how many times as long the Taylor method takes, one column for each kind of processor."""
     by_problem = {
         kind: {pair.problem: pair for run in runs for pair in head_to_heads(run)}
@@ -174,7 +174,7 @@ def ratios(results: Mapping[str, Sequence[Kept]]) -> Table:
 
 
 @styled
-def ratios_drawn(results: Mapping[str, Sequence[Kept]]) -> Picture:
+def ratios_drawn(results: Mapping[str, Sequence[StoredRun]]) -> Picture:
     """Draw the ratios, a line for each problem, with the goals."""
     pairs_of = {kind: [pair for run in runs for pair in head_to_heads(run)] for kind, runs in results.items()}
     problems = list(dict.fromkeys(pair.problem for members in pairs_of.values() for pair in members))

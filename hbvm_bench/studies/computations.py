@@ -1,8 +1,8 @@
-"""The computations behind the page of a study: run side by side, kept beside the cases, and read again.
+"""The computations behind the page of a study: run side by side, stored beside the cases, and read again.
 
-They are what no integration of a campaign is: bisections, maps of many starts, sections, orders. What one
-returns is kept as MessagePack, in which not-a-number and every bit of a double survive; the type that its
-function is annotated with says how it is read again.
+They are no integrations of a campaign: bisections, maps of many initial conditions, sections, orders. What
+one returns is stored as MessagePack, in which not-a-number and every bit of a double survive; the type
+that its function is annotated with says how it is read again.
 """
 
 import functools
@@ -60,31 +60,33 @@ class Part:
     key: str
     title: str
     runs: Sequence[Task]
-    claims: Callable[["Results"], list[Claim]]  # what a publication says and what came out
-    blocks: Callable[["Results"], list[Maker]]  # what makes each block that is shown
+    claims: Callable[["PartResults"], list[Claim]]  # published values and computed ones
+    blocks: Callable[["PartResults"], list[Maker]]  # what makes each block that is shown
 
     @property
     def tasks(self) -> list[Task]:
-        """The computations under the names by which they are kept: those of all parts lie side by side."""
+        """The computations under the names by which they are stored: those of all parts lie side by side."""
         return [replace(task, key=f"{self.key}/{task.key}") for task in self.runs]
 
 
-class Kept(msgspec.Struct, frozen=True):
-    """What came out, by task: the packed result, or why there is none; and by what code."""
+class StoredResults(msgspec.Struct, frozen=True):
+    """Results by task: the packed result, or why there is none; and by what code."""
 
     results: dict[str, bytes]
     failed: dict[str, str]
     code: str
 
 
-class Results:
+class PartResults:
     """What the computations of a part returned, by their names; asking for one that failed says why.
 
     What `split` divided is put together again. ``records`` are the cases of the run, by method.
     """
 
-    def __init__(self, part: Part, kept: Kept, records: Mapping[str, Record] | None = None) -> None:
-        self.part, self.kept, self.records = part.key, kept, records or {}
+    def __init__(
+        self, part: Part, stored: StoredResults, records: Mapping[str, Record] | None = None
+    ) -> None:
+        self.part, self.stored, self.records = part.key, stored, records or {}
         self.tasks = {task.key: task for task in part.tasks}
         self.read: dict[str, Any] = {}
 
@@ -103,15 +105,17 @@ class Results:
         return {value: self[f"{name} {value}"] for value in values}
 
     def _result(self, key: str) -> Any:
-        if key not in self.kept.results:
-            raise InputError(f"the computation {key!r} {self.kept.failed.get(key, 'was not run')}.")
-        return unpacked(self.kept.results[key], self.tasks[key].run)
+        if key not in self.stored.results:
+            raise InputError(f"the computation {key!r} {self.stored.failed.get(key, 'was not run')}.")
+        return unpacked(self.stored.results[key], self.tasks[key].run)
 
 
-def claims_of(parts: Sequence[tuple[Part, "Results"]], title: str, nav: str, given: str = "paper") -> Section:
-    """Return every claim of the parts with what was published, called ``given``, and what came out."""
+def claims_of(
+    parts: Sequence[tuple[Part, PartResults]], title: str, nav: str, given: str = "paper"
+) -> Section:
+    """Return every claim of the parts with the published value, called ``given``, and the computed one."""
 
-    def claims(part: Part, results: Results) -> Claims:
+    def claims(part: Part, results: PartResults) -> Claims:
         return Claims([(part.title, part.key, part.claims(results))])
 
     makers = [
@@ -123,7 +127,7 @@ def claims_of(parts: Sequence[tuple[Part, "Results"]], title: str, nav: str, giv
     return Section(title, [Claims(groups, given), *failed], "all-claims", nav=nav)
 
 
-def sections_of(parts: Sequence[tuple[Part, "Results"]]) -> list[Section]:
+def sections_of(parts: Sequence[tuple[Part, PartResults]]) -> list[Section]:
     """Return the section of each part."""
     return [
         Section(part.title, attempt(*part.blocks(results)), part.key, nav=part.title)
@@ -159,7 +163,7 @@ def run_all(
     store: Store,
     done: Callable[[str, str], None],
     variant: str = "",
-) -> Kept:
+) -> StoredResults:
     """Run tasks in so many processes, or here; keep each result at once, so that an end loses no other.
 
     Those that this code has computed for the store, in the same variant, are not run again. ``name`` is that
@@ -167,19 +171,19 @@ def run_all(
     of it.
     """
     code = digest_of(tuple({function_of(task.run).__module__ for task in tasks})) + variant
-    kept = Kept({}, {}, code)
+    stored = StoredResults({}, {}, code)
     with suppress(InputError):
         before = load(name, store.beside())
-        kept = Kept(before.results, {}, code) if before.code == code else kept
-    left = sorted((task for task in tasks if task.key not in kept.results), key=lambda task: -task.cost)
+        stored = StoredResults(before.results, {}, code) if before.code == code else stored
+    left = sorted((task for task in tasks if task.key not in stored.results), key=lambda task: -task.cost)
     for key, data, why, seconds in _outcomes(left, jobs):
         if why:
-            kept.failed[key] = why
+            stored.failed[key] = why
         else:
-            kept.results[key] = data
-        write_json(store.directory / f"{name}.json", kept)
+            stored.results[key] = data
+        write_json(store.directory / f"{name}.json", stored)
         done(key, why or f"{seconds:.1f} s")
-    return kept
+    return stored
 
 
 def _outcomes(tasks: Sequence[Task], jobs: int) -> Iterator[tuple[str, bytes, str, float]]:
@@ -203,7 +207,7 @@ def _side_by_side(tasks: Sequence[Task], jobs: int) -> Iterator[tuple[str, bytes
                 yield futures[future], b"", f"ended with {type(error).__name__}: {error}", 0.0
 
 
-def load(name: str, beside: Mapping[str, object]) -> Kept:
+def load(name: str, beside: Mapping[str, object]) -> StoredResults:
     """Return what a store or an archive keeps of a study beside its cases.
 
     Raises
@@ -214,7 +218,7 @@ def load(name: str, beside: Mapping[str, object]) -> Kept:
     if name not in beside:
         raise InputError(f"the computations of {name} were not run; run hbvm-bench {name} first.")
     try:
-        return msgspec.convert(beside[name], Kept)
+        return msgspec.convert(beside[name], StoredResults)
     except msgspec.ValidationError as error:
         raise InputError(f"what is kept of the computations of {name} is damaged: {error}.") from None
 

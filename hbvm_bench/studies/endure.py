@@ -1,4 +1,4 @@
-"""Endurance: its campaign, what is read off the trajectories (errors, laws, times, goals), and its page."""
+"""Endurance: its campaign, what its trajectories give (errors, growth, times, goals), and its page."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -18,12 +18,12 @@ from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
 from hbvm_bench.report.figures.style import MUTED, Look
 from hbvm_bench.report.page import Results, block
 from hbvm_bench.report.provenance import again
-from hbvm_bench.store.kept import Kept
-from hbvm_bench.store.records import Law
+from hbvm_bench.store.records import ErrorGrowth
+from hbvm_bench.store.stored_run import StoredRun
 from hbvm_bench.summaries import outcomes, standings
 from hbvm_bench.summaries.goals import Verdict, verdicts
 from hbvm_bench.summaries.goals import table as goals_table
-from hbvm_bench.summaries.laws import clear, power_of, text
+from hbvm_bench.summaries.growth import clear, power_of, text
 from hbvm_bench.summaries.points import number
 from hbvm_bench.summaries.rows import seconds
 from hbvm_bench.summaries.table import NONE, Table
@@ -42,7 +42,7 @@ class Endurance:
 
     Attributes
     ----------
-    run : Kept
+    run : StoredRun
         What was asked for, and the records.
     t : ndarray, shape (n,)
         Sampling times after the start, in years.
@@ -50,7 +50,7 @@ class Endurance:
         Signed relative errors of the energy from each start that reached the end, by method.
     """
 
-    run: Kept
+    run: StoredRun
     t: Array
     errors: dict[str, Array]
 
@@ -120,8 +120,8 @@ class Line:
     starts, failed : int
         Trajectories that finished and that did not.
     rms : dict of float to float
-        Root mean square over the starts of the relative energy error, by time in years.
-    drift : Law or None
+        Root mean square over the initial conditions of the relative energy error, by time in years.
+    drift : ErrorGrowth or None
         Of its error; ``None`` without a finished trajectory.
     seconds : float or None
         Median of the trajectories.
@@ -133,7 +133,7 @@ class Line:
     starts: int
     failed: int
     rms: dict[float, float]
-    drift: Law | None
+    drift: ErrorGrowth | None
     seconds: float | None
     times_ours: float | None
 
@@ -153,8 +153,8 @@ def lines(result: Endurance) -> list[Line]:
                 starts=len(errors),
                 failed=max(result.starts, 1) - len(errors),
                 rms=dict(zip(years, rms, strict=False)),
-                drift=clear(record.result.laws["energy"])
-                if errors.size and "energy" in record.result.laws
+                drift=clear(record.result.growth["energy"])
+                if errors.size and "energy" in record.result.growth
                 else None,
                 seconds=number(record, standings.TIME),
                 times_ours=ratio.median if ratio else None,
@@ -169,7 +169,7 @@ def goals(result: Endurance) -> list[Verdict]:
 
 
 LAW_POINTS = 40
-FALLS_ON = 30  # a law is drawn over the last part of the span, from this fraction of it
+FALLS_ON = 30  # a growth is drawn over the last part of the interval, from this fraction of it
 METHOD = """
 The methods run one after the other from each initial condition, in one process on one core. The energy is
 evaluated in double-double arithmetic at whole years, spaced evenly in log time, at ends of steps or in a way
@@ -207,13 +207,13 @@ def measured_on(results: Results) -> Note:
 
 @block
 def errors_and_goals(results: Results) -> list[Table]:
-    """Return the tables: the errors with their laws, and the goals."""
+    """Return the tables: the errors with their growth, and the goals."""
     return tables(measured_last(results))
 
 
 @block
 def energy_over_time(results: Results) -> Picture | None:
-    """Draw the rms over the starts against time."""
+    """Draw the rms over the initial conditions against time."""
     return over_time(measured_last(results), results.look)
 
 
@@ -232,21 +232,21 @@ def run_again(results: Results) -> Section:
 
 
 def tables(result: Endurance) -> list[Table]:
-    """Return the tables: the errors with their laws, and the goals."""
+    """Return the tables: the errors with their growth, and the goals."""
     shown = lines(result)
     years = sorted({year for line in shown for year in line.rms})
     rows = []
     for line in shown:
-        law = line.drift
+        growth = line.drift
         rows.append(
             (
                 line.method,
                 f"{line.starts}" + (f", {line.failed} failed" if line.failed else ""),
                 *(f"{line.rms[year]:.1e}" if year in line.rms else NONE for year in years),
-                NONE if law is None else _named(law),
-                NONE if law is None or not law.law else power_of(law),
-                NONE if law is None or law.mean is None else _mean(law),
-                NONE if law is None or law.rate is None else _rate(law),
+                NONE if growth is None else _named(growth),
+                NONE if growth is None or not growth.kind else power_of(growth),
+                NONE if growth is None or growth.mean is None else _mean(growth),
+                NONE if growth is None or growth.rate is None else _rate(growth),
                 NONE if line.seconds is None else seconds(line.seconds),
                 NONE if line.times_ours is None else f"{line.times_ours:.3g}",
             )
@@ -275,27 +275,27 @@ def tables(result: Endurance) -> list[Table]:
     return tables_
 
 
-def _named(law: Law) -> str:
-    if law.law is None:
-        return law.why
-    return "grows" if law.law == "power" else drift.LAWS[law.law]
+def _named(growth: ErrorGrowth) -> str:
+    if growth.kind is None:
+        return growth.why
+    return "grows" if growth.kind == "power" else drift.KINDS[growth.kind]
 
 
-def _mean(law: Law) -> str:
-    """Return the mean over the starts with its standard error and the count of signs."""
-    spread = "" if law.mean_error is None else f" ± {law.mean_error:.1e}"
-    return f"{law.mean:+.1e}{spread} ({law.positive} of {law.starts} positive)"
+def _mean(growth: ErrorGrowth) -> str:
+    """Return the mean over the initial conditions with its standard error and the count of signs."""
+    spread = "" if growth.mean_error is None else f" ± {growth.mean_error:.1e}"
+    return f"{growth.mean:+.1e}{spread} ({growth.positive} of {growth.starts} positive)"
 
 
-def _rate(law: Law) -> str:
+def _rate(growth: ErrorGrowth) -> str:
     """Return the mean drift per year with its interval, which one start does not have."""
-    bare = law.rate_low is None or law.rate_high is None
-    return f"{law.rate:+.1e}" + ("" if bare else f" ({law.rate_low:+.1e} to {law.rate_high:+.1e})")
+    bare = growth.rate_low is None or growth.rate_high is None
+    return f"{growth.rate:+.1e}" + ("" if bare else f" ({growth.rate_low:+.1e} to {growth.rate_high:+.1e})")
 
 
 @styled
 def over_time(result: Endurance, look: Mapping[str, Look]) -> Picture | None:
-    """Draw the rms over the starts against time, with every start behind it; ``None`` without any."""
+    """Draw the rms over the trajectories against time, with each of them behind it; ``None`` without any."""
     t = result.t
     shown = [(method, errors) for method, errors in result.errors.items() if errors.size]
     if not shown:
@@ -326,10 +326,10 @@ def over_time(result: Endurance, look: Mapping[str, Look]) -> Picture | None:
             label=method,
         )
         traces.append(Trace(number, method, t, np.where(rms > 0.0, rms, np.nan)))
-        law = line_of[method].drift
-        if law is not None and law.law is not None:
+        growth = line_of[method].drift
+        if growth is not None and growth.kind is not None:
             at = np.geomspace(t[-1] / FALLS_ON, t[-1], LAW_POINTS)
-            traces.append(Trace(number, method, at, drift.curve(law, at), "law", text(law)))
+            traces.append(Trace(number, method, at, drift.curve(growth, at), "fit", text(growth)))
     guide = t[t >= t[-1] / 1e3]
     axes.plot(guide, 10.0 ** (low + 0.4) * np.sqrt(guide / guide[0]), color=MUTED, linewidth=0.8)
     axes.annotate(" √t", (guide[-1], 10.0 ** (low + 0.4) * math.sqrt(guide[-1] / guide[0])), color=MUTED)

@@ -39,7 +39,7 @@ class Change:
 
 
 @dataclass
-class Comparison:
+class RunComparison:
     """What changed from a first run to a second one."""
 
     cases: int = 0  # those that both have
@@ -61,7 +61,7 @@ class Comparison:
         return not (self.only_first or self.only_second or self.changed or self.slower or self.faster)
 
 
-def compare(first: Store, second: Store) -> Comparison:
+def compare(first: Store, second: Store) -> RunComparison:
     """Compare two runs case by case.
 
     A case of one run is that of the other if problem, method and sampling are the
@@ -74,7 +74,7 @@ def compare(first: Store, second: Store) -> Comparison:
     """
     first_records, other = _by_case(reading.records(first)), _by_case(reading.records(second))
     both = [(record, other[key]) for key, record in first_records.items() if key in other]
-    comparison = Comparison(
+    comparison = RunComparison(
         cases=len(both),
         only_first=[_name(record.case) for key, record in first_records.items() if key not in other],
         only_second=[_name(record.case) for key, record in other.items() if key not in first_records],
@@ -109,7 +109,7 @@ def _behind(both: Sequence[tuple[Record, Record]]) -> list[str]:
     return list(dict.fromkeys(reasons))
 
 
-def _compare_numbers(before: Record, after: Record, comparison: Comparison) -> None:
+def _compare_numbers(before: Record, after: Record, comparison: RunComparison) -> None:
     strict = before.id == after.id and machine.same(before.machine, after.machine)
 
     def differs(label: str, was: str, now: str) -> None:
@@ -124,9 +124,9 @@ def _compare_numbers(before: Record, after: Record, comparison: Comparison) -> N
         if metric.unit in COSTS or not (key in metrics_before or key in other):
             continue
         a, b = metrics_before.get(key, Value()), other.get(key, Value())
-        if a.value == b.value and a.void == b.void:
+        if a.value == b.value and a.excluded == b.excluded:
             comparison.equal += 1
-        elif a.value is None or b.value is None or a.void != b.void:
+        elif a.value is None or b.value is None or a.excluded != b.excluded:
             differs(metric.label, _shown(metric, a), _shown(metric, b))
         elif not strict and _is_rounding(metric, a.value, b.value):
             comparison.rounded += 1
@@ -136,7 +136,9 @@ def _compare_numbers(before: Record, after: Record, comparison: Comparison) -> N
 
 def _shown(metric: Metric, value: Value) -> str:
     text = format_value(metric, value).text
-    return f"({text}), {value.why}" if value.void else text if value.value is not None else value.why or text
+    if value.excluded:
+        return f"({text}), {value.why}"
+    return text if value.value is not None else value.why or text
 
 
 def _is_rounding(metric: Metric, a: float, b: float) -> bool:
@@ -148,7 +150,7 @@ def _is_rounding(metric: Metric, a: float, b: float) -> bool:
     return large <= ROUNDING and large <= ROUNDING_FACTOR * max(small, sys.float_info.epsilon)
 
 
-def _compare_times(both: Sequence[tuple[Record, Record]], comparison: Comparison) -> None:
+def _compare_times(both: Sequence[tuple[Record, Record]], comparison: RunComparison) -> None:
     pairs: list[tuple[Record, Record, list[float], list[float]]] = []
     for before, after in both:
         why = next(_untimed((before, after)), "")

@@ -48,11 +48,11 @@ def of_settings(fastest: Sequence[tuple[str, Mapping[str, Record | None]]]) -> T
     if not rows:
         return None
     return Table(
-        "The best of the compilations beside their median",
+        "Best and median of the compilations",
         ("problem", "library", "fastest setting", *SPREAD, "best over best of HBVM and Gauss"),
         rows,
         "Each compilation, in a fresh process with empty caches, has the median of its samples. The same "
-        "code may be slower where it lies otherwise in memory: the best compilation is what a library can "
+        "code may be slower at other addresses in memory: the best compilation is what a library can "
         "reach.",
         words=(0, 1, 2),
         key="compilations",

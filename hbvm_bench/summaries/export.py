@@ -20,16 +20,16 @@ from hbvm_bench.store.records import Record, Timing, Value
 from hbvm_bench.store.store import Store, damage
 from problems.errors import InputError, MissingLibraryError, unknown
 
-Row = tuple[Any, ...]
+ExportRow = tuple[Any, ...]
 FORMATS = (".csv", ".parquet")
 
 
 @dataclass(frozen=True)
-class Table:
+class ExportTable:
     """One of the tables: its columns, each of which may be empty in a row, and the rows of a case."""
 
     columns: dict[str, type]
-    rows: Callable[[Record, Store], Iterable[Row]]
+    rows: Callable[[Record, Store], Iterable[ExportRow]]
 
 
 def export(stores: Sequence[Store] | Sequence[Archive], path: Path, table: str = "cases") -> int:
@@ -82,14 +82,14 @@ def _whole(declared: msgspec.Struct) -> dict[str, Any]:
 
 
 @contextmanager
-def _csv(path: Path, columns: dict[str, type]) -> Iterator[Callable[[list[Row]], object]]:
+def _csv(path: Path, columns: dict[str, type]) -> Iterator[Callable[[list[ExportRow]], object]]:
     with path.open("wb") as stream:
         stream.write(csv_of([list(columns)]))
         yield lambda rows: stream.write(csv_of(rows))
 
 
 @contextmanager
-def _parquet(path: Path, columns: dict[str, type]) -> Iterator[Callable[[list[Row]], None]]:
+def _parquet(path: Path, columns: dict[str, type]) -> Iterator[Callable[[list[ExportRow]], None]]:
     try:
         import pyarrow
         from pyarrow.parquet import ParquetWriter
@@ -101,7 +101,7 @@ def _parquet(path: Path, columns: dict[str, type]) -> Iterator[Callable[[list[Ro
     types = {str: pyarrow.string(), int: pyarrow.int64(), float: pyarrow.float64(), bool: pyarrow.bool_()}
     schema = pyarrow.schema([(name, types[kind]) for name, kind in columns.items()])
 
-    def write(rows: list[Row]) -> None:
+    def write(rows: list[ExportRow]) -> None:
         named = [dict(zip(columns, row, strict=True)) for row in rows]
         writer.write_table(pyarrow.Table.from_pylist(named, schema=schema))
 
@@ -109,11 +109,11 @@ def _parquet(path: Path, columns: dict[str, type]) -> Iterator[Callable[[list[Ro
         yield write
 
 
-def _case(record: Record) -> Row:
+def _case(record: Record) -> ExportRow:
     return tuple(value(record) for _, value in CASES.values())
 
 
-def _timings(record: Record, store: Store) -> Iterator[Row]:
+def _timings(record: Record, store: Store) -> Iterator[ExportRow]:
     del store
     for number, round_ in enumerate(record.timing.rounds if record.timing else []):
         calibration = median(round_.calibration) if round_.calibration else None
@@ -122,7 +122,7 @@ def _timings(record: Record, store: Store) -> Iterator[Row]:
             yield (*_key(record), number, sample, seconds, *rest)
 
 
-def _series(record: Record, store: Store) -> Iterator[Row]:
+def _series(record: Record, store: Store) -> Iterator[ExportRow]:
     series = store.series(record.id)
     if why := damage(record, series, make_problem(record.case.problem).system.dim):
         yield (*_key(record), f"damaged: {why}", None, None, None, None)
@@ -136,7 +136,7 @@ def _series(record: Record, store: Store) -> Iterator[Row]:
                 yield (*_key(record), name, i, component, t, float(value))
 
 
-def _key(record: Record) -> Row:
+def _key(record: Record) -> ExportRow:
     return record.id, record.case.problem, record.case.method
 
 
@@ -158,8 +158,8 @@ def _metric(key: str) -> dict[str, tuple[type, Callable[[Record], Any]]]:
         value = evaluated(record).value
         return None if value is None else float(value)
 
-    void, why = (lambda record: evaluated(record).void), (lambda record: evaluated(record).why)
-    return {key: (float, number), f"{key}_void": (bool, void), f"{key}_why": (str, why)}
+    excluded, why = (lambda record: evaluated(record).excluded), (lambda record: evaluated(record).why)
+    return {key: (float, number), f"{key}_void": (bool, excluded), f"{key}_why": (str, why)}
 
 
 def _calibration(timing: Timing) -> float | None:
@@ -212,7 +212,9 @@ _TIMINGS = {"round": int, "sample": int, "seconds": float, "repeats": int, "cali
 _COMPILE = {"share": float, "compile_seconds": float, "compile_cached": bool}
 _SERIES = {"quantity": str, "sample": int, "component": int, "t": float, "value": float}
 TABLES = {
-    "cases": Table({name: kind for name, (kind, _) in CASES.items()}, lambda record, _: [_case(record)]),
-    "timings": Table(_KEY | _TIMINGS | _COMPILE, _timings),
-    "series": Table(_KEY | _SERIES, _series),
+    "cases": ExportTable(
+        {name: kind for name, (kind, _) in CASES.items()}, lambda record, _: [_case(record)]
+    ),
+    "timings": ExportTable(_KEY | _TIMINGS | _COMPILE, _timings),
+    "series": ExportTable(_KEY | _SERIES, _series),
 }

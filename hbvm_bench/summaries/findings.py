@@ -1,4 +1,4 @@
-"""What can be read off a formula or a problem, and which engine accepts it, and why not."""
+"""What an analysis of a formula or a problem gives, and which engine accepts it, and why not."""
 
 import dataclasses
 from collections.abc import Sequence

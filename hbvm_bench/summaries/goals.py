@@ -15,7 +15,7 @@ from hbvm_bench.summaries import standings
 from hbvm_bench.summaries.outcomes import OTHER_WORK
 from hbvm_bench.summaries.points import number
 from hbvm_bench.summaries.rows import format_metric
-from hbvm_bench.summaries.standings import Comparison
+from hbvm_bench.summaries.standings import SettingComparison
 from hbvm_bench.summaries.table import NONE, Table
 
 TIMES = ("warm_seconds", "throughput")
@@ -33,10 +33,10 @@ class Verdict:
     words: str  # what it is about
     asked: str
     measured: str
-    # void: energies are compared without positions; not judged: the machine had other work
-    verdict: Literal["reached", "missed", "void", "not judged"]
-    why: str  # why nothing was measured, or why it is void or not judged
-    comparison: Comparison  # the cases that decide; for a goal without a peer it has only ours
+    # excluded: energies are compared without positions; not judged: the machine had other work
+    verdict: Literal["reached", "missed", "excluded", "not judged"]
+    why: str  # why nothing was measured, or why it is excluded or not judged
+    comparison: SettingComparison  # the cases that decide; for a goal without a peer it has only ours
     records: Sequence[Record]  # of all cases on the problem
 
     @property
@@ -112,7 +112,7 @@ def other_work(records: Sequence[Record | None]) -> str:
         return ""
     loads = [item.load for item in timings if item.load is not None]
     shares = [1.0 - median(round_.share for round_ in item.rounds) for item in timings if item.rounds]
-    most = max([0.0, *shares, *(max(load.others, load.stolen) for load in loads)])
+    most = max([0.0, *shares, *(max(load.others, load.steal) for load in loads)])
     return f"other work took {most:.0%} of a core during the timing" if most > OTHER_WORK else ""
 
 
@@ -137,7 +137,7 @@ def _judged(goal: Goal, entry: ProblemEntry, records: Sequence[Record]) -> Verdi
         measured=NONE if ours is None else format_metric(ours, goal.metric),
         verdict="not judged" if busy else "reached" if reached else "missed",
         why=next(missing, "") if ours is None else busy,
-        comparison=Comparison(ours, None),
+        comparison=SettingComparison(ours, None),
         records=records,
     )
 
@@ -146,7 +146,7 @@ def _against(goal: Goal, entry: ProblemEntry, records: Sequence[Record], ratio: 
     within = goal.within if goal.within or goal.no_worse else entry.within
     able = standings.among(records, goal.method), standings.among(records, goal.against)
     theirs = standings.best(able[1], within, goal.metric)
-    comparison = Comparison(None, None)
+    comparison = SettingComparison(None, None)
     if theirs is not None:
         allowed = standings.no_worse(theirs, goal.no_worse)
         allowed |= {key: min(bound, allowed.get(key, bound)) for key, bound in within.items()}
@@ -156,7 +156,7 @@ def _against(goal: Goal, entry: ProblemEntry, records: Sequence[Record], ratio: 
     reached = comparison.ratio is not None and comparison.ratio.median >= ratio
     verdict, why = "reached" if reached else "missed", ""
     if blind:
-        verdict, why = "void", "energy is not ranked without position"
+        verdict, why = "excluded", "energy is not ranked without position"
     elif comparison.ratio is None:
         why = (
             "no setting of the other library is as accurate"
@@ -218,7 +218,7 @@ def as_data(judged: Sequence[Verdict]) -> list[dict[str, object]]:
     ]
 
 
-def ratio_data(comparison: Comparison) -> dict[str, object]:
+def ratio_data(comparison: SettingComparison) -> dict[str, object]:
     """Return a comparison as plain data for JSON."""
     low, high = (comparison.ratio.low, comparison.ratio.high) if comparison.ratio else (None, None)
     data: dict[str, object] = {

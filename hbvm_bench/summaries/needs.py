@@ -17,8 +17,8 @@ from functools import partial
 from statistics import median
 from typing import NamedTuple
 
-from hbvm_bench.store.records import Law, Record
-from hbvm_bench.summaries.laws import clear
+from hbvm_bench.store.records import ErrorGrowth, Record
+from hbvm_bench.summaries.growth import clear
 from hbvm_bench.summaries.points import accurate, by_family, by_problem, family_of, number, work_of
 from hbvm_bench.summaries.table import Table
 
@@ -154,9 +154,9 @@ def _within(**errors: float) -> Callable[[Record], bool]:
 
 def _without_drift(record: Record) -> bool:
     """Whether the energy is bounded, or grows no faster than unbiased rounding: the interval has 1/2."""
-    law = clear(record.result.laws.get("energy", Law()))
-    slow = law.law == "power" and law.slope_low is not None and law.slope_low <= 0.5
-    return accurate(record, {}) and (law.law == "bounded" or slow)
+    growth = clear(record.result.growth.get("energy", ErrorGrowth()))
+    slow = growth.kind == "power" and growth.slope_low is not None and growth.slope_low <= 0.5
+    return accurate(record, {}) and (growth.kind == "bounded" or slow)
 
 
 @dataclass(frozen=True)

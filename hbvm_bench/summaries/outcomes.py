@@ -148,18 +148,18 @@ def beside(records: Sequence[Record]) -> list[str]:
 
 def other_work(loads: Sequence[Load]) -> str:
     """Say what else ran while times were taken, from at least one look at it."""
-    others, stolen = (_shares([getattr(load, name) for load in loads]) for name in ("others", "stolen"))
+    others, steal = (_shares([getattr(load, name) for load in loads]) for name in ("others", "steal"))
     doubt = "; the times are doubtful" if any(map(_doubtful, loads)) else ""
     return (
         f"While times were taken, other processes used {others} of a core, and the steal time was "
-        f"{stolen} of one{doubt}."
+        f"{steal} of one{doubt}."
     )
 
 
 def shares(records: Sequence[Record]) -> tuple[str, str]:
     """Return what other processes used of a core while times were taken, and the host; else why not known."""
     if loads := _loads(records):
-        return _shares([load.others for load in loads]), _shares([load.stolen for load in loads])
+        return _shares([load.others for load in loads]), _shares([load.steal for load in loads])
     why = "not recorded" if _rounds(records) else "no case timed"
     return why, why
 
@@ -196,7 +196,7 @@ def busy(records: Sequence[Record]) -> bool:
 
 
 def _doubtful(load: Load) -> bool:
-    return max(load.others, load.stolen) > OTHER_WORK
+    return max(load.others, load.steal) > OTHER_WORK
 
 
 def _loads(records: Sequence[Record]) -> list[Load]:

@@ -70,7 +70,7 @@ def accurate(record: Record, within: Mapping[str, float]) -> bool:
     return all(error is not None and error <= bound for error, bound in errors)
 
 
-def front(items: Iterable[T], place: Callable[[T], tuple[float, float]]) -> list[T]:
+def pareto_front(items: Iterable[T], place: Callable[[T], tuple[float, float]]) -> list[T]:
     """Return what nothing else beats in both work and error, by ascending work; ``place`` gives the two."""
     best: list[T] = []
     least = math.inf

@@ -36,14 +36,14 @@ class Cell:
     """One metric of one case, formatted."""
 
     text: str
-    void: bool  # whether the number must not be compared
-    why: str  # why it is void or missing
+    excluded: bool  # whether the number must not be compared
+    why: str  # why it is excluded or missing
     sort: float  # for sorting; infinite where there is no number
 
     @property
     def shown(self) -> str:
-        """The text, in brackets where it is void."""
-        return f"({self.text})" if self.void else self.text
+        """The text, in brackets where it is excluded."""
+        return f"({self.text})" if self.excluded else self.text
 
 
 @dataclass(frozen=True)
@@ -193,11 +193,11 @@ def format_value(metric: Metric, value: Value) -> Cell:
         text = f"{number:.6f}" if 1e-3 < abs(number) < 10 else f"{number:.4g}"
     else:
         text = "0" if number == 0 else f"{number:.1e}"
-    return Cell(text, value.void, value.why, math.inf if value.void else number)
+    return Cell(text, value.excluded, value.why, math.inf if value.excluded else number)
 
 
 def format_metric(record: Record, key: str) -> str:
-    """Format a metric of a case; in brackets where it is void, a dash where there is none."""
+    """Format a metric of a case; in brackets where it is excluded, a dash where there is none."""
     return format_value(METRICS[key], record.result.metrics.get(key, Value())).shown
 
 

@@ -1,4 +1,4 @@
-"""Who is how fast at which accuracy: read off the records of a problem, the same way for every family.
+"""Run times at required accuracies, from the records of a problem, the same way for every family.
 
 Times that chose a setting do not compare it; see `hbvm_bench.measure.timing.chooses`.
 """
@@ -21,7 +21,7 @@ TIME = "warm_seconds"
 
 
 @dataclass(frozen=True)
-class Comparison:
+class SettingComparison:
     """A peer's best setting beside our best one."""
 
     ours: Record | None  # what takes least of the settings that are accurate enough
@@ -76,10 +76,10 @@ def best(records: Sequence[Record], within: Mapping[str, float], metric: str = T
 
 def compare(
     ours: Record | None, theirs: Record | None, metric: str = TIME, *, chosen: bool = False
-) -> Comparison:
+) -> SettingComparison:
     """Compare two cases of one problem; where they were ``chosen``, in the rounds that did not choose."""
     if ours is None or theirs is None:
-        return Comparison(ours, theirs)
+        return SettingComparison(ours, theirs)
     if metric == TIME:
         base = by_round(ours)
         ratio_of = {key: seconds / base[key] for key, seconds in by_round(theirs).items() if key in base}
@@ -87,10 +87,10 @@ def compare(
         apart = [ratio for key, ratio in ratio_of.items() if by_others and not chooses(key)]
         ratios = (apart if chosen else []) or [*ratio_of.values()]
         ratio = Spread.from_samples(ratios) if ratios else None
-        return Comparison(ours, theirs, ratio, chosen and bool(ratios) and not apart)
+        return SettingComparison(ours, theirs, ratio, chosen and bool(ratios) and not apart)
     numbers = number(theirs, metric), number(ours, metric)
     ratio = numbers[0] / numbers[1] if numbers[0] is not None and numbers[1] else None
-    return Comparison(ours, theirs, None if ratio is None else Spread.from_samples([ratio]))
+    return SettingComparison(ours, theirs, None if ratio is None else Spread.from_samples([ratio]))
 
 
 def by_round(record: Record) -> dict[int, float]:
@@ -102,7 +102,7 @@ def by_round(record: Record) -> dict[int, float]:
     }
 
 
-def untuned(records: Sequence[Record], family: str, errors: Sequence[str]) -> Comparison:
+def untuned(records: Sequence[Record], family: str, errors: Sequence[str]) -> SettingComparison:
     """Compare a peer at its defaults with the fastest of HBVM and Gauss that is as accurate, in these errors.
 
     Its defaults are what is called so, or has no arguments.
@@ -111,7 +111,7 @@ def untuned(records: Sequence[Record], family: str, errors: Sequence[str]) -> Co
     defaults = [record for record, given in named if record.case.settings == "default" or not given]
     theirs = best(defaults, dict.fromkeys(errors, math.inf))
     if theirs is None:
-        return Comparison(None, None)
+        return SettingComparison(None, None)
     return compare(
         best(among(records, ""), no_worse(theirs, dict.fromkeys(errors, 1.0))), theirs, chosen=True
     )

@@ -275,7 +275,7 @@ class _Part:
         """Return by what an error is multiplied on the way from here to the problem's end."""
         if self.whole == 1.0:
             return 1.0
-        least = 1.5 if trial.last < NEAR * FLOOR else 1.0  # a walk of the energy is integrated
+        least = 1.5 if trial.last < NEAR * FLOOR else 1.0  # a random walk of the energy is integrated
         return float(self.whole ** np.clip(np.log2(max(trial.grown, 1.0)), least, 2.0))
 
     def expected(self, trial: _Trial) -> float:
@@ -390,7 +390,7 @@ def _why(scout: _Scout, span: _Part, proposals: tuple[Proposal, ...], met: bool,
     if span.end != end:
         words.append(
             f"{scout.reason or 'That takes long.'} Settings were tried up to t={span.end:g}, "
-            f"{100.0 / span.whole:.2g} % of the span; what comes "
+            f"{100.0 / span.whole:.2g} % of the integration interval; what comes "
             "later is extrapolated, and wrong where the motion becomes chaotic or an encounter comes."
         )
     keeping = next((proposal for proposal in proposals if (proposal.energy or 0.0) <= KEPT), None)

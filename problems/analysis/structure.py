@@ -1,4 +1,4 @@
-"""What can be read off a traced system: degree, time, coordinates that do not occur."""
+"""Structure of a traced system: degree, time, coordinates that do not occur."""
 
 import numpy as np
 from numpy.typing import ArrayLike

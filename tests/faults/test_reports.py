@@ -9,8 +9,8 @@ import pytest
 
 from hbvm_bench import cli
 from hbvm_bench.store import archive
-from hbvm_bench.store.kept import Kept
 from hbvm_bench.store.store import Store
+from hbvm_bench.store.stored_run import StoredRun
 from problems.errors import InputError
 from tests.hbvm_bench.made_up_run import archived
 from tests.hbvm_bench.studies.race.conftest import made_up as a_race
@@ -47,7 +47,7 @@ def test_a_campaign_with_an_ensemble_is_run_and_reported_as_it_is_typed(tmp_path
     assert "| `Gauss(s=2, h=0.25)` |" in ours
     assert "| `Gauss(s=3, h=0.25)` |" not in ours
     assert "| `Gauss(s=3, h=0.25)` |" in together
-    one, several = text[text.index("What came out") : text.index("\n| # | method")].split("3 trajectories", 1)
+    one, several = text[text.index("## Results") : text.index("\n| # | method")].split("3 trajectories", 1)
     assert "at these ends" in several
     assert "at these ends" not in one
     assert "3 trajectories at once" in (tmp_path / "r" / "index.html").read_text(encoding="utf-8")
@@ -86,7 +86,7 @@ def stored_results(directory):
     run = a_duel(said["machine"])
     records = [msgspec.structs.replace(one, versions=said["versions"]) for one in run.records]
     index = msgspec.structs.replace(run.index, command=said["command"])
-    archived(directory / "automatic", Kept(index=index, records=records))
+    archived(directory / "automatic", StoredRun(index=index, records=records))
 
 
 @pytest.mark.parametrize("name", ["race", "endure", "automatic"])

@@ -86,12 +86,22 @@ SERIES = [
     Damage("t all NaN", put(t=np.full(41, np.nan)), "do not go one way"),
     Damage("t back and forth", put(t=np.tile([0.0, 1.0], 21)[:41]), "do not go one way"),
     Damage("a number for all times", put(t=np.array(1.0)), r"t has the shape \(1,\)"),
-    Damage("starts of another problem", put(**{"starts.y0": np.ones((2, 3))}), r"starts have the shape"),
-    Damage("starts without states", put(**{"starts.y0": np.ones((2, 2))}), "further starts do not belong"),
+    Damage(
+        "starts of another problem",
+        put(**{"starts.y0": np.ones((2, 3))}),
+        r"further initial conditions have the shape",
+    ),
+    Damage(
+        "starts without states", put(**{"starts.y0": np.ones((2, 2))}), "further trajectories do not belong"
+    ),
     Damage("a way back of another problem", put(**{"reversal.y": np.ones((1, 3))}), "way back"),
     Damage("MEGNO at two times", put(**{"chaos.megno": np.ones(2)}), "chaos.megno has the shape"),
     Damage("an exponent without interval", put(**{"chaos.exponent": np.ones(1)}), "chaos.exponent has"),
-    Damage("a witness beyond the end", put(**{"witness.index": np.array([41.0])}), "witnesses"),
+    Damage(
+        "a reference trajectory beyond the end",
+        put(**{"witness.index": np.array([41.0])}),
+        "reference subset",
+    ),
     Damage("drift without times", put(**{"drift.energy": np.ones((2, 7))}), "drift"),
     Damage("steps without times", put(**{"extra.dt_history": np.ones(4)}), "step sizes"),
     Damage(

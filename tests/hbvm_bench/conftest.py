@@ -58,9 +58,9 @@ def toys(toy_path, monkeypatch):
 
 
 def run_case(case, directory, limits):
-    """Integrate one case in a process of its own, store it, and return it with what is read off it."""
+    """Integrate one case in a process of its own, store it, and return it with its reading."""
     record, series = execute(task_of(resolve(case), limits))
     made = decoded(record, Record)
     store = Store(Path(directory))
     store.save(made, series or None)
-    return reading.kept(store, made)
+    return reading.up_to_date(store, made)

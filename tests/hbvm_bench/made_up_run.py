@@ -39,7 +39,7 @@ def record(case="m()", times=(), **given):
     ``case`` is the text of a method, a case or a resolved one; ``times`` are the seconds of interleaved
     rounds, ``None`` for one that it was left out of. What is given goes to the record, its case or its
     result, whichever has a field of the name; metrics may be numbers, and those that are ``None`` are left
-    out. All metrics are void where a violation is given.
+    out. All metrics are excluded where a violation is given.
     """
     mine = {struct: {key: given.pop(key) for key in struct.__struct_fields__ if key in given}
             for struct in (Case, Result)}  # fmt: skip
@@ -53,7 +53,7 @@ def record(case="m()", times=(), **given):
     seconds = {"warm_seconds": median(one.samples[0] for one in rounds)} if rounds else {}
     why = result.get("violation", "")
     result["metrics"] = {
-        key: one if isinstance(one, Value) else Value(value=one, void=bool(why), why=why)
+        key: one if isinstance(one, Value) else Value(value=one, excluded=bool(why), why=why)
         for key, one in (seconds | result["metrics"]).items()
         if one is not None
     }
@@ -118,7 +118,7 @@ def made_up(method, number):
 
 def raw_of(result):
     """Return a result as a worker returns it."""
-    return msgspec.structs.replace(result, metrics={}, violation="", laws={})
+    return msgspec.structs.replace(result, metrics={}, violation="", growth={})
 
 
 def sitnikov(store):
@@ -166,7 +166,7 @@ def methods(count):
 
 
 def write(store, texts, count, *, missing=0):
-    """Put a run of made-up cases into a store: errors that follow a law, some failures."""
+    """Put a run of made-up cases into a store: errors that grow in known ways, some failures."""
     store.prepare()
     names, rng = methods(count), np.random.default_rng(1)
     t = np.linspace(0.0, 100.0, 201)
@@ -182,7 +182,7 @@ def write(store, texts, count, *, missing=0):
             error = size * np.sqrt(t / t[-1]) * (1 + 0.1 * rng.standard_normal(t.size)) ** 2
             values = {"position_end": 30 * size, "energy_max": size, "warm_seconds": 1e-3 / size**0.1}
             metrics = {
-                key: Value(value=value, void=stalled, why="only to t = 50" if stalled else "")
+                key: Value(value=value, excluded=stalled, why="only to t = 50" if stalled else "")
                 for key, value in {**values, "distance_max": 1.0, "steps": 100.0 + number}.items()
             }
             cold = Compile(seconds=0.1, cached=False)

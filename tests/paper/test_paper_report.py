@@ -91,7 +91,7 @@ def stored(directory):
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_tasks_give_the_same_results_here_and_in_processes(tmp_path, jobs):
     kept, said = ran(work(3), tmp_path, jobs)
-    found = results.Results(part(3), stored(tmp_path))
+    found = results.PartResults(part(3), stored(tmp_path))
     assert [found["0"], found["1"], found["2"]] == [0, 1, 4]
     assert stored(tmp_path) == kept
     if jobs == 1:
@@ -106,12 +106,12 @@ def test_what_was_divided_is_put_together_again(tmp_path):
     runs = results.split("rows", row, [1.0, 2.0, 3.0, 4.0, 5.0], 2, cost=1)
     whole = results.Part("p", "P", runs, lambda found: [], lambda found: [])
     ran(whole.tasks, tmp_path)
-    assert results.Results(whole, stored(tmp_path))["rows"] == [2.0, 3.0, 4.0, 5.0, 6.0]
+    assert results.PartResults(whole, stored(tmp_path))["rows"] == [2.0, 3.0, 4.0, 5.0, 6.0]
 
 
 def test_a_computation_that_fails_loses_no_other_and_says_why(tmp_path):
     ran(work(4), tmp_path)
-    found = results.Results(part(4), stored(tmp_path))
+    found = results.PartResults(part(4), stored(tmp_path))
     assert found["2"] == 4
     with pytest.raises(InputError, match=r"'squares/3' failed with ValueError: three is too many \(test_pa"):
         found["3"]
@@ -122,7 +122,7 @@ def test_a_run_goes_on_where_it_was_but_not_by_other_code(tmp_path):
     assert list(ran(work(3), tmp_path)[1]) == ["squares/2"]
     assert list(ran(work(3), tmp_path)[1]) == []
     kept = stored(tmp_path)
-    write_json(tmp_path / "paper.json", results.Kept(kept.results, {}, code="another"))
+    write_json(tmp_path / "paper.json", results.StoredResults(kept.results, {}, code="another"))
     assert len(ran(work(3), tmp_path)[1]) == 3
 
 

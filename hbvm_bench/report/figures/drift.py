@@ -1,4 +1,4 @@
-"""The drift of the energy: its error over the starts, and the law that was fitted to it where it is clear."""
+"""The energy error, rms over initial conditions, and the growth fitted to it where it is clear."""
 
 from collections.abc import Sequence
 
@@ -9,8 +9,8 @@ from hbvm_bench.measure import drift
 from hbvm_bench.report.figures.canvas import Picture, log_axis, picture, power_range
 from hbvm_bench.report.figures.over_time import Drawn, family_panels, panel_legend, trace
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
-from hbvm_bench.store.records import Law
-from hbvm_bench.summaries.laws import FEWEST_STARTS, NOT_CLEAR, clear, text
+from hbvm_bench.store.records import ErrorGrowth
+from hbvm_bench.summaries.growth import FEWEST_STARTS, NOT_CLEAR, clear, text
 from hbvm_bench.summaries.rows import reached
 
 Array = NDArray[np.float64]
@@ -20,17 +20,17 @@ LAW_POINTS = 40
 MOST_CASES = 60
 POWERS = (-18, 3)  # an error beyond is no drift but a failure, and is in the table
 
-Found = tuple[Array, Array, Law]
+Found = tuple[Array, Array, ErrorGrowth]
 
 
 def drift_figure(cases: Sequence[Drawn]) -> Picture | None:
-    """Draw the error of the energy, rms over starts and windows of time, with its law; else ``None``."""
+    """Draw the energy error, rms over initial conditions and time windows, with its growth; else ``None``."""
     drifts = {c.record.id: got for c in cases[:MOST_CASES] if (got := _drift(c)) is not None}
     shown = [case for case in cases if case.record.id in drifts and _visible(drifts[case.record.id][1])]
     if not shown:
         return None
-    laws = {key: law for key, (_, _, law) in drifts.items()}
-    said = {key: text(law) for key, law in laws.items() if law.law is not None}
+    growths = {key: growth for key, (_, _, growth) in drifts.items()}
+    said = {key: text(growth) for key, growth in growths.items() if growth.kind is not None}
     curves = {key: _windows(t, rows) for key, (t, rows, _) in drifts.items()}
     label = "energy error, rms"
     notes = {key: words.replace(" to ", "–") for key, words in said.items()}
@@ -46,12 +46,12 @@ def drift_figure(cases: Sequence[Drawn]) -> Picture | None:
         for case in members:
             key, look = case.record.id, case.look
             t, error = curves[key]
-            at, fitted = _law(laws[key], t)
+            at, fitted = _fitted(growths[key], t)
             axes.plot(t, error, look.marker, color=look.light, markersize=2.4, linestyle="")
             axes.plot(at, fitted, color=look.light, linewidth=1.1, dashes=look.dash)
-            traces += [trace(case, t, error), trace(case, at, fitted, role="law", note=said.get(key, ""))]
+            traces += [trace(case, t, error), trace(case, at, fitted, role="fit", note=said.get(key, ""))]
         panel_legend(axes, members, markers=True, notes=notes)
-    starts = max(law.starts for law in laws.values())
+    starts = max(growth.starts for growth in growths.values())
     over = (
         f"{starts} initial conditions (the problem's, and others changed in their last digits)"
         if starts > 1
@@ -84,19 +84,19 @@ def _visible(rows: Array) -> bool:
 
 
 def _drift(case: Drawn) -> Found | None:
-    """Return times, errors of shape (starts, n) and their law, which a single trajectory has not."""
-    stored = case.record.result.laws.get("energy")
+    """Return times, errors of shape (starts, n) and their growth, which a single trajectory has not."""
+    stored = case.record.result.growth.get("energy")
     if stored is not None and "drift.energy" in case.series:
         t, rows = case.series["drift.t"], np.atleast_2d(case.series["drift.energy"])
         return (t, rows, clear(stored)) if t.size > 1 else None
     if not reached(case.record) or "error.energy" not in case.series:
         return None
     t, error = np.abs(case.series["t"] - case.series["t"][0]), case.series["error.energy"]
-    return (t[1:], error[None, 1:], Law()) if t.size > 2 and np.isfinite(error).all() else None
+    return (t[1:], error[None, 1:], ErrorGrowth()) if t.size > 2 and np.isfinite(error).all() else None
 
 
 def _windows(t: Array, rows: Array) -> tuple[Array, Array]:
-    """Return the rms over starts in windows that are equally long in log t; what is 0 is left out."""
+    """Return the rms over trajectories in windows that are equally long in log t; zeros are left out."""
     good = np.isfinite(rows).all(axis=0) & (t > 0)
     t, each = t[good], drift.rms(rows[:, good])
     if not t.size:
@@ -108,10 +108,10 @@ def _windows(t: Array, rows: Array) -> tuple[Array, Array]:
     return middle[error > 0], error[error > 0]
 
 
-def _law(law: Law, t: Array) -> tuple[Array, Array]:
-    if law.law is None or t.size < 2:
+def _fitted(growth: ErrorGrowth, t: Array) -> tuple[Array, Array]:
+    if growth.kind is None or t.size < 2:
         return np.empty(0), np.empty(0)
     at = np.geomspace(t[0], t[-1], LAW_POINTS)
-    fitted = drift.curve(law, at)
+    fitted = drift.curve(growth, at)
     good = fitted > 0
     return at[good], fitted[good]

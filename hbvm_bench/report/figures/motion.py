@@ -45,7 +45,7 @@ def chosen(cases: Sequence[Drawn]) -> list[list[Drawn]]:
 
 
 def still(cases: Sequence[Drawn], title: str) -> Picture | None:
-    """Draw the system at the end of the span, a pane per method; ``None`` without two methods to compare."""
+    """Draw the system at the end, a pane per method; ``None`` without two methods to compare."""
     panes = chosen(cases)
     if len(panes) < 2:
         return None

@@ -32,8 +32,8 @@ class Trace:
     name: str  # of the case, or of what else it is
     x: Array  # shape (n,); what is not finite is a gap
     y: Array
-    role: Literal["case", "law", "truth"] = "case"  # a law is drawn thin over its case; the truth is neutral
-    note: str = ""  # what the law says
+    role: Literal["case", "fit", "reference"] = "case"  # a fit is thin, a reference grey
+    note: str = ""  # what the fit says
 
 
 @dataclass(frozen=True)
@@ -65,10 +65,10 @@ def numbers(plot: Plot) -> Table:
     if plot.kind == "lines":
         ends = [trace.x[np.isfinite(trace.x)] for _, trace in cases if trace.x.size]
         places = _places(ends, log=bool(plot.panels) and plot.panels[0].x.log)
-        laws = {(panel.title, trace.case): trace.note for panel, trace in traces if trace.role == "law"}
-        head = (*head, *(f"at {place:.3g}" for place in places), "largest", "law")
+        fits = {(panel.title, trace.case): trace.note for panel, trace in traces if trace.role == "fit"}
+        head = (*head, *(f"at {place:.3g}" for place in places), "largest", "growth")
         cells = [
-            [(*(_at(trace, place) for place in places), _range(np.abs(trace.y))[1], laws.get(key, ""))]
+            [(*(_at(trace, place) for place in places), _range(np.abs(trace.y))[1], fits.get(key, ""))]
             for key, trace in (((panel.title, trace.case), trace) for panel, trace in cases)
         ]
     elif plot.kind == "points":

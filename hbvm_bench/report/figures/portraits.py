@@ -52,7 +52,7 @@ def section(problem: Problem, cases: Sequence[Drawn]) -> Picture | None:
         "poincare-section",
         "Poincaré section",
         "Where the samples pass q₁ = 0 with p₁ > 0, between two samples on a straight line. A regular orbit "
-        "makes curves, a chaotic one fills an area; on a chaotic orbit no method is right point by point.",
+        "makes curves, a chaotic one fills an area; on a chaotic orbit no method is accurate point by point.",
         ("q₂", "p₂"),
     )
 

@@ -71,9 +71,10 @@ def profiles(records: Sequence[Record], numbers: Mapping[str, int]) -> Picture |
         figure,
         "profiles",
         "Performance profiles",
-        f"The share of the problems on which the best setting of a family needs at most so many times "
-        f"the {label} of the best of all. Where a line ends on the right is the share it solves at all. "
-        "Of each family those problems count on which it ran. "
+        "The share of the problems on which the best setting of a family needs at most this multiple of "
+        f"the {label} of the best of all. The right end of a line is the share of problems that it "
+        "solves at all. "
+        "Only problems on which a family ran count for it. "
         "Dolan and Moré, Mathematical Programming 91 (2002).",
         said,
         Plot(panels),

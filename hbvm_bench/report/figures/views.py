@@ -23,7 +23,7 @@ REVOLUTION = 21.46  # of the primaries
 
 
 def axis_motion(problem: Problem, cases: Sequence[Drawn], reference: Reference | None) -> Picture | None:
-    """Draw the planetoid's z over the last part of the span, a panel per family."""
+    """Draw the planetoid's z over the last part of the interval, a panel per family."""
     start = problem.t_end - LAST
     shown = [case for case in cases if case.series["t"].size and case.series["t"][-1] > start]
     if not shown:
@@ -41,7 +41,7 @@ def axis_motion(problem: Problem, cases: Sequence[Drawn], reference: Reference |
             late = reference.t >= start
             known = reference.t[late], reference.high[late, PLANETOID_Z]
             axes.plot(*known, "o", mfc="none", color=INK, ms=5, clip_on=False, zorder=5)
-            truth = [Trace(0, "128-bit reference", *known, role="truth")]
+            truth = [Trace(0, "128-bit reference", *known, role="reference")]
         axes.set(xlim=(start, problem.t_end), ylim=(-REACH, REACH))
         panel_legend(axes, members)
     whole = [case for case in shown if case.series["t"][-1] == problem.t_end]

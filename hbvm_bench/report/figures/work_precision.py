@@ -13,7 +13,7 @@ from hbvm_bench.report.figures.over_time import WIDTH, Drawn, trace
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
 from hbvm_bench.report.figures.style import MUTED
 from hbvm_bench.store.records import Record
-from hbvm_bench.summaries.points import accurate, family_of, front, number
+from hbvm_bench.summaries.points import accurate, family_of, number, pareto_front
 
 MOST_NAMED = 30  # cases in the legend
 # Where a number may stand beside its point, in points; the first that is free is taken.
@@ -83,13 +83,13 @@ def _envelopes(axes: Axes, cases: Sequence[Drawn], spots: Sequence[tuple[float, 
     traces = []
     for name in dict.fromkeys(family_of(case.record) for case in cases):
         members = [(s, c) for s, c in zip(spots, cases, strict=True) if family_of(c.record) == name]
-        best = front([spot for spot, _ in members], lambda spot: spot)
+        best = pareto_front([spot for spot, _ in members], lambda spot: spot)
         if len(best) < 2:
             continue
         x, y = np.array(best).T
         look = members[0][1].look
         axes.plot(x, y, color=look.light, linewidth=0.8, zorder=1)
-        traces.append(Trace(look.number, f"best of {name}", x, y, "law", "on the Pareto front"))
+        traces.append(Trace(look.number, f"best of {name}", x, y, "fit", "on the Pareto front"))
     return traces
 
 

@@ -1,4 +1,4 @@
-"""Lyapunov exponents of the systems by our tangent vectors and by heyoka's variational equations, with times.
+"""Lyapunov exponents by HBVM's tangent vectors and by heyoka's variational equations, with times.
 
 Both sides follow the same start to the same end, make all tangent vectors orthonormal equally often, and are
 compiled before; their runs alternate in one process.
@@ -29,16 +29,16 @@ SAMPLES = 3  # runs of each side that are timed
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """What came out of one system.
+    """Results for one system.
 
     Attributes
     ----------
     exponents : ndarray, shape (dim,)
-        Ours, in 1/time, the largest first.
+        Of HBVM(), in 1/time, the largest first.
     intervals : ndarray, shape (dim, 2)
         Each with 95 % confidence.
     sum : float
-        Of ours.
+        Of these.
     time : float
         That they are averages over.
     heyoka : ndarray, shape (dim,)
@@ -46,9 +46,9 @@ class Measured:
     seconds, heyoka_seconds : list of float
         Of whole runs after compiling.
     others, stolen : float
-        What else the machine did meanwhile, as shares of one core's time.
+        Time of other processes, and steal time, as shares of one core's time.
     divergence : float or None
-        The mean of the field's divergence along our trajectory; ``None`` in results that are older.
+        The mean divergence of the vector field along HBVM's trajectory; ``None`` in older results.
     """
 
     exponents: Array
@@ -98,7 +98,7 @@ def measured(name: str, share: float = 1.0, samples: int = SAMPLES) -> Measured:
         seconds=seconds[0],
         heyoka_seconds=seconds[1],
         others=load.others if load else 0.0,
-        stolen=load.stolen if load else 0.0,
+        stolen=load.steal if load else 0.0,
         divergence=mine.divergence,
     )
 

@@ -40,13 +40,13 @@ def values(figure: Figure, measured: Mapping[str, Measured]) -> Said:
     axes.set_yticks(range(len(rows)), labels=[_label(name, known.source) for name, known in rows])
     axes.invert_yaxis()
     axes.set(xlabel="largest exponent over the published value")
-    axes.plot([], [], "o", color=COLOURS["hbvm"], label="ours, with 95 % interval")
+    axes.plot([], [], "o", color=COLOURS["hbvm"], label="HBVM(), with 95 % interval")
     axes.plot([], [], "s", color=INK, mfc="none", label="heyoka")
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
     return (
-        "Bars: our 95 % intervals, divided by the published value; squares: heyoka's values, which belong to "
-        "other trajectories of the same attractor, as chaotic ones diverge.",
-        f"{inside} of {len(rows)} published values lie in our intervals.",
+        "Bars: 95 % intervals of HBVM(), divided by the published value; squares: heyoka's values, which "
+        "belong to other trajectories of the same attractor, as chaotic ones diverge.",
+        f"{inside} of {len(rows)} published values lie in the 95 % intervals of HBVM().",
     )
 
 
@@ -84,7 +84,9 @@ def curves(figure: Figure, lines: Curves) -> Said:
     )
 
 
-@drawn("chaos-sitnikov", "Sitnikov's problem over eccentricity and start", WIDTH * 0.8, 4.4, values=True)
+@drawn(
+    "chaos-sitnikov", "Sitnikov's problem over eccentricity and initial speed", WIDTH * 0.8, 4.4, values=True
+)
 def sitnikov(
     figure: Figure, es: Sequence[float], speeds: Sequence[float], rows: Sequence[Array], turns: int
 ) -> Said:
@@ -115,7 +117,7 @@ def sections(
     energies: Sequence[Sequence[Array]],
     t_end: float,
 ) -> Said:
-    """Draw MEGNO of the starts on the section at three energies."""
+    """Draw MEGNO of the initial conditions on the section at three energies."""
     panels = figure.subplots(1, len(energies), sharey=True)
     meshes, said = [], []
     for axes, energy, rows in zip(panels, maps.ENERGIES, energies, strict=True):

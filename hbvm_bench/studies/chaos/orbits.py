@@ -113,7 +113,7 @@ def _curve(indicator: Indicator) -> Array:
 
 
 @dataclass(frozen=True)
-class Row:
+class IndicatorRow:
     """One library's MEGNO and largest exponent of a planetary system."""
 
     method: str
@@ -128,7 +128,7 @@ class Row:
 class Planets:
     """One planetary system, and what else the machine did meanwhile, as shares of one core's time."""
 
-    rows: list[Row]
+    rows: list[IndicatorRow]
     others: float
     stolen: float
 
@@ -166,11 +166,11 @@ def planets(name: str, share: float = 1.0, samples: int = SAMPLES) -> Planets:
     for (key, result), taken in zip(results.items(), seconds, strict=True):
         if isinstance(result, Indicator):
             low, high = mine.intervals[0].tolist()
-            rows.append(Row(key, result.value, float(mine.exponents[0]), low, high, taken))
+            rows.append(IndicatorRow(key, result.value, float(mine.exponents[0]), low, high, taken))
         else:
             indicator, exponent = result
-            rows.append(Row(key, indicator, exponent, None, None, taken))
-    return Planets(rows, load.others if load else 0.0, load.stolen if load else 0.0)
+            rows.append(IndicatorRow(key, indicator, exponent, None, None, taken))
+    return Planets(rows, load.others if load else 0.0, load.steal if load else 0.0)
 
 
 def _simulation(axis: float, eccentricity: float) -> Any:

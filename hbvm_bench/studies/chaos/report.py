@@ -1,4 +1,4 @@
-"""The page on chaos, from kept results alone: published values and ours, and the maps."""
+"""The page on chaos, from stored results alone: published and computed values, and the maps."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,13 +8,12 @@ from statistics import median
 import numpy as np
 
 from hbvm_bench.report.document import Claim, Items, Maker, Note, Section
-from hbvm_bench.report.page import Results as Run
-from hbvm_bench.report.page import block
+from hbvm_bench.report.page import Results, block
 from hbvm_bench.studies.chaos import exponents, figures, maps, orbits
 from hbvm_bench.studies.chaos.systems import SOURCES, SYSTEMS, Known, Published
 from hbvm_bench.studies.computations import (
     Part,
-    Results,
+    PartResults,
     Task,
     claims_of,
     computing,
@@ -111,7 +110,7 @@ def parts(*, quick: bool) -> list[Part]:
             _exponent_claims,
             partial(_exponent_blocks, size.share),
         ),
-        Part("indicators", "What must hold exactly", checks, _exact_claims, _curve_blocks),
+        Part("indicators", "Exact relations", checks, _exact_claims, _curve_blocks),
         Part(
             "sitnikov",
             "Sitnikov's problem",
@@ -159,30 +158,30 @@ COMPUTATIONS = {"compute": computing(NAME, lambda quick: parts(quick=quick))}
 
 
 @block
-def claims(run: Run) -> Section:
-    """Return every published or exact value with what came out."""
+def claims(run: Results) -> Section:
+    """Return every published or exact value with the computed one."""
     return claims_of(_parts(run), "Published and exact values", "Values", "published or exact")
 
 
 @block
-def experiments(run: Run) -> list[Section]:
+def experiments(run: Results) -> list[Section]:
     """Return the section of each part."""
     return sections_of(_parts(run))
 
 
-def _parts(run: Run) -> list[tuple[Part, Results]]:
-    kept = load(NAME, run.beside)
+def _parts(run: Results) -> list[tuple[Part, PartResults]]:
+    stored = load(NAME, run.beside)
     records = {record.case.method: record for record in run.records}
     quick = run.runs[-1].index.campaign.quick
-    return [(part, Results(part, kept, records)) for part in parts(quick=quick)]
+    return [(part, PartResults(part, stored, records)) for part in parts(quick=quick)]
 
 
-def _none(results: Results) -> list[Claim]:
+def _none(results: PartResults) -> list[Claim]:
     del results
     return []
 
 
-def _measured(results: Results) -> dict[str, exponents.Measured]:
+def _measured(results: PartResults) -> dict[str, exponents.Measured]:
     return {name: results[f"of {name}"] for name in SYSTEMS}
 
 
@@ -197,7 +196,7 @@ def _within(known: Published, measured: exponents.Measured) -> bool:
     return bool(low <= known.exponents[0] <= high)
 
 
-def _exponent_claims(results: Results) -> list[Claim]:
+def _exponent_claims(results: PartResults) -> list[Claim]:
     judged = []
     for name, here in _measured(results).items():
         for published in SYSTEMS[name].published:
@@ -215,30 +214,33 @@ def _exponent_claims(results: Results) -> list[Claim]:
 
 
 def _decided(known: Known, published: Published, here: exponents.Measured) -> str:
-    """Return what an exact law says of a published value outside our interval."""
+    """Return what an exact relation says of a published value outside the computed interval."""
     low, high = here.intervals[0]
     agrees = "inside" if low <= here.heyoka[0] <= high else "outside"
-    other = f"heyoka's value is {here.heyoka[0]:.4f}, {agrees} our interval"
+    other = f"heyoka's value is {here.heyoka[0]:.4f}, {agrees} this interval"
     total = sum(published.exponents)
     if known.divergence is None:
-        return f"The divergence is no constant, so no exact sum decides; {other}"
+        return f"The divergence is not constant, so the sum is not known exactly; {other}"
     if len(published.exponents) == 4:
         return (
             f"The exponents of a Hamiltonian system come in pairs of opposite signs and add up to 0; the "
-            f"published ones add up to {total:.4f} and are no pairs, ours add up to {here.sum:.1e}; {other}"
+            f"published ones add up to {total:.4f} and are not paired, the computed ones add up to "
+            f"{here.sum:.1e}; {other}"
         )
     if abs(total - known.divergence) > len(published.exponents) * 1e-4:
         return (
-            f"The sum is the divergence, {known.divergence:g}; the published exponents add up to "
-            f"{total:.4f}, ours to it within {abs(here.sum - known.divergence):.0e}; {other}"
+            f"The sum of the exponents equals the divergence, {known.divergence:g}. The published ones "
+            "add up "
+            f"to {total:.4f}, the computed ones to the divergence within "
+            f"{abs(here.sum - known.divergence):.0e}; {other}"
         )
     return (
-        f"The published exponents add up to the divergence, {known.divergence:g}, as ours do (within "
-        f"{abs(here.sum - known.divergence):.0e}), so the sum does not decide; {other}"
+        f"The published exponents add up to the divergence, {known.divergence:g}, and so do the computed "
+        f"ones (within {abs(here.sum - known.divergence):.0e}), so the sum does not decide; {other}"
     )
 
 
-def _exact_claims(results: Results) -> list[Claim]:
+def _exact_claims(results: PartResults) -> list[Claim]:
     checks: orbits.Checks = results["checks"]
     curves: orbits.Curves = results["curves"]
     off = abs(checks.sum + 41 / 3)
@@ -279,7 +281,7 @@ def _exact_claims(results: Results) -> list[Claim]:
     ]
 
 
-def _exponent_blocks(share: float, results: Results) -> list[Maker]:
+def _exponent_blocks(share: float, results: PartResults) -> list[Maker]:
     def planets() -> Table:
         return _planets({name: results[f"planets {name}"] for name in orbits.PLANETS}, share)
 
@@ -292,12 +294,12 @@ def _exponent_blocks(share: float, results: Results) -> list[Maker]:
     ]
 
 
-def _curve_blocks(results: Results) -> list[Maker]:
+def _curve_blocks(results: PartResults) -> list[Maker]:
     return [("MEGNO over time", lambda: figures.curves(results["curves"]))]
 
 
 HOW = (
-    f"Ours: `{exponents.METHOD!r}` with its tangent vectors (`integrators.lyapunov`). heyoka: "
+    f"HBVM: `{exponents.METHOD!r}` with its tangent vectors (`integrators.lyapunov`). heyoka: "
     f"`var_ode_sys` of first order and `taylor_adaptive` with tol={exponents.TOLERANCE:g}. Both make all "
     f"vectors orthonormal equally often, at least {INTERVALS} times, in Python; the runs of one "
     "system alternate in one process on one core, compiled before. Intervals: 95 %, from the slowest "
@@ -306,8 +308,8 @@ HOW = (
 )
 
 
-def _spent(seconds: Sequence[float], others: float, stolen: float) -> str:
-    judged = max(others, stolen) <= OTHER_WORK
+def _spent(seconds: Sequence[float], others: float, steal: float) -> str:
+    judged = max(others, steal) <= OTHER_WORK
     return in_words(median(seconds)) + ("" if judged else " (not judged)")
 
 
@@ -322,10 +324,10 @@ def _busy(shares: Sequence[float]) -> str:
 
 def _times(measured: dict[str, exponents.Measured]) -> Table:
     rows = []
-    summed, timed = "divergence of the field, where that is a constant", ""
+    summed, timed = "divergence of the vector field, where that is a constant", ""
     if any(here.divergence is not None for here in measured.values()):  # not in older results
-        summed = "mean divergence of the field along the trajectory"
-        timed = "; where the divergence is not constant, ours contain its integration"
+        summed = "mean divergence of the vector field along the trajectory"
+        timed = "; where the divergence is not constant, the times of HBVM() contain its integration"
     for name, here in measured.items():
         known, load_ = SYSTEMS[name], (here.others, here.stolen)
         divergence = known.divergence if here.divergence is None else here.divergence
@@ -345,12 +347,12 @@ def _times(measured: dict[str, exponents.Measured]) -> Table:
     return Table(
         "Exponents and times",
         (
-            *("system", "published", "ours, 95 %", "heyoka", "time span", "sum off by"),
-            *("time, ours", "time, heyoka"),
+            *("system", "published", "HBVM(), 95 %", "heyoka", "time span", "sum off by"),
+            *("time, HBVM()", "time, heyoka"),
         ),
         rows,
-        f"Sum off by: the sum of our exponents less the {summed}. Times: median of whole runs with all "
-        f"exponents, without compiling{timed}."
+        f"Sum off by: the sum of the computed exponents less the {summed}. Times: median of whole runs with "
+        f"all exponents, without compiling{timed}."
         + _busy([max(here.others, here.stolen) for here in measured.values()]),
         words=(0,),
         key="exponents-times",

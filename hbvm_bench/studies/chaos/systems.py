@@ -1,7 +1,7 @@
 """Fifteen systems whose Lyapunov exponents are published, with the values, and where these stand.
 
-Of most systems the divergence of the field is a constant, which the exponents add up to; a published spectrum
-that does not is wrong in some digit.
+For most systems the divergence of the vector field is a constant, which is the sum of the exponents; a
+published spectrum with another sum is wrong in some digit.
 """
 
 from collections.abc import Callable, Sequence
@@ -55,11 +55,11 @@ class Known:
     field : callable
         The derivative, of the arguments that it names; or the energy, where ``canonical``.
     y0 : tuple of float
-        The start.
+        The initial state.
     t_end : float
         The end of the averages, which begin at `SKIP`.
     divergence : float or None
-        Of the field where it is a constant.
+        Of the vector field where it is a constant.
     published : sequence of Published
         The values.
     canonical : bool

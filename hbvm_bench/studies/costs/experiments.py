@@ -76,7 +76,7 @@ def calls(rounds: int) -> Times:
     problem = problems.load("kepler", t_end=SHORT)
 
     def sample(text: str) -> float:
-        methods = [make_method(text) for _ in range(BATCH)]  # each call has a method that is made anew
+        methods = [make_method(text) for _ in range(BATCH)]  # each call has a new method object
         begun = time.perf_counter()
         for method in methods:
             integrate(problem, method, [SHORT])
@@ -129,7 +129,7 @@ def _taken(samples: dict[str, Callable[[], float]], rounds: int) -> Times:
     load = load_between(before, busy())
     if load is None:
         raise InputError("the clock stood still while times were taken.")
-    return Times(dict(zip(samples, seconds, strict=True)), load.others, load.stolen)
+    return Times(dict(zip(samples, seconds, strict=True)), load.others, load.steal)
 
 
 PROGRAM = """

@@ -1,4 +1,4 @@
-"""The page on costs, from kept results alone."""
+"""The page on costs, from stored results alone."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -10,10 +10,9 @@ from hbvm_bench.measure.measured import POSITION
 from hbvm_bench.measure.timing import Spread
 from hbvm_bench.report import provenance
 from hbvm_bench.report.document import Items, Maker, Note, Section, attempt
-from hbvm_bench.report.page import Results as Run
-from hbvm_bench.report.page import block
+from hbvm_bench.report.page import Results, block
 from hbvm_bench.store.records import Record
-from hbvm_bench.studies.computations import Part, Results, Task, computing, load, sections_of
+from hbvm_bench.studies.computations import Part, PartResults, Task, computing, load, sections_of
 from hbvm_bench.studies.costs import experiments, variations
 from hbvm_bench.studies.costs.beside_c import ECCENTRICITY, IN_C, OURS, SOURCE, STEP, BesideC, beside_c
 from hbvm_bench.studies.costs.experiments import CALLED, FIRST, ON_LATTICES, STEPPED, Iterations, Times
@@ -81,7 +80,7 @@ def parts(*, quick: bool) -> list[Part]:
     c_task = Task("times", partial(beside_c, QUICK_C_STEPS if quick else C_STEPS, rounds), timed=True)
     lattices = [Task(f"of {n}", partial(experiments.iterations, n, t_end), cost=n / 100) for n in sizes]
 
-    def on_lattices(results: Results) -> list[Maker]:
+    def on_lattices(results: PartResults) -> list[Maker]:
         return [("the iterations", lambda: iterations({n: results[f"of {n}"] for n in sizes}, t_end))]
 
     def measured(
@@ -110,7 +109,7 @@ COMPUTATIONS = {"compute": computing(NAME, lambda quick: parts(quick=quick))}
 
 
 @block
-def tolerances(run: Run) -> list[Section]:
+def tolerances(run: Results) -> list[Section]:
     """Return the times at looser tolerances, of HBVM and of its projection apart, with the errors."""
     members = ratios(run)
     blocks = attempt(
@@ -125,15 +124,15 @@ def tolerances(run: Run) -> list[Section]:
 
 
 @block
-def beside(run: Run) -> list[Section]:
+def beside(run: Results) -> list[Section]:
     """Return what was computed beside the cases."""
-    kept = load(NAME, run.beside)
+    stored = load(NAME, run.beside)
     quick = run.runs[-1].index.campaign.quick
-    return sections_of([(part, Results(part, kept)) for part in parts(quick=quick)])
+    return sections_of([(part, PartResults(part, stored)) for part in parts(quick=quick)])
 
 
 @block
-def conditions(run: Run) -> Section:
+def conditions(run: Results) -> Section:
     """Return the processor, the other work while times were taken, and the compilations."""
     records = run.records
     said = [*provenance.processors(records), *outcomes.compilations(records), *outcomes.beside(records)]
@@ -143,7 +142,7 @@ def conditions(run: Run) -> Section:
     )
 
 
-def ratios(run: Run) -> dict[str, list[Ratio]]:
+def ratios(run: Results) -> dict[str, list[Ratio]]:
     """Return the settings of each problem beside `DEFAULT`, which comes first, by the problem's title."""
     campaign = run.runs[-1].index.campaign
     members: dict[str, list[Ratio]] = {}
@@ -215,7 +214,7 @@ def details(members: Mapping[str, Sequence[Ratio]]) -> Table:
 
 
 def iterations(counted: Mapping[int, Mapping[str, Iterations]], t_end: float) -> Table:
-    """Return the iterations a step by the size of the lattice."""
+    """Return the iterations per step by the size of the lattice."""
     rows = []
     for n, by_method in counted.items():
         cells = []
@@ -225,10 +224,10 @@ def iterations(counted: Mapping[int, Mapping[str, Iterations]], t_end: float) ->
             cells += [a_step, f"{cost.steps}", cost.solver]
         rows.append((f"{n}", *cells))
     heads = [
-        f"{method}, {what}" for method in ON_LATTICES for what in ("iterations a step", "steps", "solver")
+        f"{method}, {what}" for method in ON_LATTICES for what in ("iterations per step", "steps", "solver")
     ]
     return Table(
-        "Iterations a step on the discrete nonlinear Schroedinger equation",
+        "Iterations per step on the discrete nonlinear Schroedinger equation",
         ("places", *heads),
         rows,
         f"From a rough start to t = {t_end:g}: `hbvm_bench.studies.costs.lattice`.",
@@ -246,7 +245,7 @@ def calls(times: Times) -> Table:
         1e6,
         "µs",
         f"Kepler's problem to t = {experiments.SHORT:g}; a sample is the mean of {experiments.BATCH} calls, "
-        "each with a method that is made anew; the system is the same.",
+        "each with a new method object; the system is the same.",
     )
 
 
@@ -303,7 +302,7 @@ def in_c(found: BesideC) -> Table | Note:
     steps = found.outcomes[OURS].steps
     return Table(
         f"A step of Gauss(8) on Kepler's problem, e = {ECCENTRICITY:g}, beside the same algorithm in C",
-        ("code", "median (ns)", "best", f"× {OURS}", "iterations a step", "energy", "position", "verdict"),
+        ("code", "median (ns)", "best", f"× {OURS}", "iterations per step", "energy", "position", "verdict"),
         rows,
         f"{steps:,} steps of length {STEP:g} in the second-order form, in turn; errors at the end. Both have "
         "the same tables, first stages, stopping rule and compensated update; "
@@ -335,6 +334,6 @@ def _timed(title: str, methods: Sequence[str], times: Times, scale: float, unit:
     )
 
 
-def _none(results: Results) -> list:
+def _none(results: PartResults) -> list:
     del results
     return []

@@ -13,7 +13,7 @@ import numpy as np
 import problems
 from hbvm_bench.measure.timing import Spread
 from hbvm_bench.report.document import Maker
-from hbvm_bench.studies.computations import Part, Results, Task
+from hbvm_bench.studies.computations import Part, PartResults, Task
 from hbvm_bench.studies.costs.experiments import Times, finished, taken_on_a_core
 from hbvm_bench.summaries.outcomes import OTHER_WORK
 from hbvm_bench.summaries.table import NONE, Table
@@ -93,7 +93,7 @@ def _seconds(run: Callable[[], object]) -> float:
 def part(rounds: int) -> Part:
     """Return the computation and its section."""
 
-    def blocks(results: Results) -> list[Maker]:
+    def blocks(results: PartResults) -> list[Maker]:
         return [("the times with tangent vectors", lambda: table(results["times"]))]
 
     return Part(KEY, TITLE, [Task("times", partial(times, rounds), timed=True)], lambda results: [], blocks)
@@ -119,8 +119,8 @@ def table(taken: Times) -> Table:
         ("method", "alone (µs)", *(f"{n} vector{'s' * (n > 1)}" for n in COUNTS[1:]), "samples", "verdict"),
         rows,
         f"The Hénon–Heiles problem to t = {END:g}, in one process: the median of the ratio within each "
-        "round, and its quartiles. A vector is the derivative with respect to one component of the start; "
-        "the orbit is chaotic, and vectors grow.",
+        "round, and its quartiles. A vector is the derivative with respect to one component of the "
+        "initial state; the orbit is chaotic, and the vectors grow.",
         words=(0, 5),
         key="costs-variations",
     )

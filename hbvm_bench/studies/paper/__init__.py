@@ -4,5 +4,5 @@ L. Brugnano, F. Iavernaro, T. Susca, "Numerical comparisons between Gauss-Legend
 methods and Hamiltonian BVMs defined over Gauss points".
 
 The modules of ``experiments`` compute. Here, each ``*_part`` lists what is computed, what the paper claims
-beside what came out, and what is shown; ``*_figures`` and ``sitnikov_beyond`` draw it.
+beside the results, and what is shown; ``*_figures`` and ``sitnikov_beyond`` draw it.
 """

@@ -14,7 +14,7 @@ from hbvm_bench.report.document import Claim, Maker
 from hbvm_bench.report.figures.canvas import log_axis, power_label, say
 from hbvm_bench.report.figures.over_time import envelope
 from hbvm_bench.report.figures.style import INK, MUTED, PAPER
-from hbvm_bench.studies.computations import Part, Results, Task, each, split
+from hbvm_bench.studies.computations import Part, PartResults, Task, each, split
 from hbvm_bench.studies.drawn import COLOURS, WIDTH, Said, drawn, heat, legend_above, number
 from hbvm_bench.studies.paper.experiments import henon_heiles as experiment
 from hbvm_bench.studies.paper.experiments import others
@@ -29,8 +29,8 @@ LABELLED = (math.radians(162), math.radians(34))  # directions from the origin, 
 PROBLEM = (
     "The paper integrates to t = 50,000 with h = 1 from a point whose energy is “very close to” "
     "1/6; it does not say which. Here: (q₁, q₂) = ({:g}, {:g}), momentum at an angle of "
-    f"{{:g}} rad, H₀ = 1/6 − {GAP:g}. The motion is chaotic, so the last bit of the "
-    f"start decides when Gauss loses the orbit: {NEIGHBOURS} starts were tried that "
+    f"{{:g}} rad, H₀ = 1/6 − {GAP:g}. The motion is chaotic, so the last bit of the initial condition "
+    f"decides when Gauss loses the orbit: {NEIGHBOURS} were tried that "
     "differ in the last bits of one momentum, and the one drawn (number {}) is "
     "the one that escapes nearest to the paper's time."
 )
@@ -50,7 +50,7 @@ def _runs() -> list[Task]:
     return runs
 
 
-def _blocks(results: Results) -> list[Maker]:
+def _blocks(results: PartResults) -> list[Maker]:
     return [
         ("the problem", lambda: PROBLEM.format(*experiment.START, results["gauss"][0])),
         ("Figure 1", lambda: level_curves(results["truth"])),
@@ -64,11 +64,11 @@ def _blocks(results: Results) -> list[Maker]:
     ]
 
 
-def _maps(results: Results) -> dict[str, Array]:
+def _maps(results: PartResults) -> dict[str, Array]:
     return {family: np.stack(rows) for family, rows in results.each("map", METHODS).items()}
 
 
-def _claims(results: Results) -> list[Claim]:
+def _claims(results: PartResults) -> list[Claim]:
     gauss: Orbit = results["gauss"][1]
     hbvm: Orbit = results["hbvm"]
     times, steps, escaped = results.each("escapes", METHODS), results.each("steps", METHODS), _maps(results)
@@ -79,7 +79,7 @@ def _claims(results: Results) -> list[Claim]:
     slopes = max(float(np.abs([x + 2 * x * y, y + x * x - y * y]).max()) for x, y in SADDLES)
     heights = max(abs(float(experiment.potential(np.array(x), np.array(y))) - ESCAPE) for x, y in SADDLES)
     left = {family: int(np.count_nonzero(~np.isnan(values))) for family, values in escaped.items()}
-    largest = {family: kept(rows) for family, rows in steps.items()}
+    largest = {family: largest_step(rows) for family, rows in steps.items()}
     agrees = max(row.agrees for rows in steps.values() for row in rows if row.h == H)
     return [
         Claim(
@@ -91,7 +91,8 @@ def _claims(results: Results) -> list[Claim]:
         Claim(
             "Gauss of order four with h = 1 lets the orbit escape",
             "t ≃ 7000",
-            f"{len(gone['gauss'])} of {starts} neighbouring starts escape before t = 50,000, the first at "
+            f"{len(gone['gauss'])} of {starts} neighbouring initial conditions escape before t = 50,000, "
+            "the first at "
             f"{min(gone['gauss'], default=np.nan):.0f}, half of all by {middle:,.0f}; the one drawn at "
             f"{number(gauss.left)}",
             "holds" if gauss.left is not None else "no",
@@ -100,7 +101,9 @@ def _claims(results: Results) -> list[Claim]:
             "Under HBVM(4,2) the orbit is in the triangle at all times",
             "50,000 points",
             f"{len(hbvm.t) - 1:,} points, {hbvm.outside} outside; {len(gone['hbvm'])} of the neighbouring "
-            f"starts and {left['hbvm']} of {escaped['hbvm'].size} other starts and energies leave, where "
+            f"initial conditions and {left['hbvm']} of {escaped['hbvm'].size} other initial conditions "
+            "and energies "
+            "leave, where "
             f"under Gauss {left['gauss']} do",
             "holds" if not (hbvm.left or hbvm.outside or gone["hbvm"] or left["hbvm"]) else "no",
         ),
@@ -119,15 +122,16 @@ def _claims(results: Results) -> list[Claim]:
         Claim(
             "HBVM allows larger steps than Gauss",
             "in the text",
-            f"of {experiment.STEP_STARTS} neighbouring starts none leaves for any h tried up to "
-            f"{largest['hbvm']:g} with HBVM(4,2), up to {largest['gauss']:g} with Gauss. Inside is not true: "
-            f"with h = 1 either orbit agrees with the reference solution up to t ≈ {agrees:.0f} only",
+            f"of {experiment.STEP_STARTS} neighbouring initial conditions none leaves for any h tried up to "
+            f"{largest['hbvm']:g} with HBVM(4,2), up to {largest['gauss']:g} with Gauss. Staying inside "
+            "does not mean being accurate: with h = 1 either orbit agrees with the reference solution "
+            f"up to t ≈ {agrees:.0f} only",
             "holds" if largest["hbvm"] > largest["gauss"] else "no",
         ),
     ]
 
 
-def kept(rows: Sequence[StepRow]) -> float:
+def largest_step(rows: Sequence[StepRow]) -> float:
     """Return the largest h up to which no orbit leaves with any step; 0 where one leaves with the first."""
     return max((row.h for row in takewhile(lambda row: not _times(row.left), rows)), default=0.0)
 
@@ -151,7 +155,8 @@ def _step_table(steps: Mapping[str, Sequence[StepRow]]) -> Table:
         "Step size and escape",
         ("h", *("leave", "the first at", "agrees until t") * 2),
         [(f"{a.h:g}", *cells(a), *cells(b)) for a, b in zip(steps["gauss"], steps["hbvm"], strict=True)],
-        f"{experiment.STEP_STARTS} neighbouring starts, followed to t = {T_END:,.0f}; a step whose equations "
+        f"{experiment.STEP_STARTS} neighbouring initial conditions, followed to t = {T_END:,.0f}; a step "
+        "whose equations "
         "find no solution counts as leaving. Agrees: time up to which the first of them is within "
         f"{experiment.AGREES:g} of the reference solution. Conserving the energy keeps the orbit inside; an "
         "accurate orbit needs a smaller step with either method.",
@@ -161,7 +166,7 @@ def _step_table(steps: Mapping[str, Sequence[StepRow]]) -> Table:
     )
 
 
-def _others(results: Results) -> Table:
+def _others(results: PartResults) -> Table:
     return others.table(
         "henon-heiles-others",
         results.each("other", others.HENON_HEILES),
@@ -170,7 +175,7 @@ def _others(results: Results) -> Table:
             "outside by": ("outside", number),
             "agrees until t": ("agrees", "{:.0f}".format),
         },
-        "The same start with other integrators",
+        "The same initial condition with other integrators",
         f"To t = {others.HENON_SPAN:g}. Largest relative energy error; largest distance beyond the "
         f"triangle; time at which the orbit is {experiment.AGREES:g} from that of HBVM(15,10), h = 1/4. "
         "Chaos doubles every error about every five units of time, so no double precision orbit agrees "
@@ -211,7 +216,7 @@ def gauss_plane(figure: Figure, run: Orbit) -> Said:
 @drawn("henon-heiles-3", f"Figure 3 · HBVM(4,2), h = {H:g}", WIDTH * 0.6, 5.0)
 def hbvm_plane(figure: Figure, run: Orbit) -> Said:
     """henon_fig3: every step in the (q1, q2) plane."""
-    return "All 50,000 steps from the first of the starts.", _orbit(figure, run, COLOURS["hbvm"])
+    return "All 50,000 steps from the first initial condition.", _orbit(figure, run, COLOURS["hbvm"])
 
 
 def _orbit(figure: Figure, run: Orbit, colour: str) -> str:
@@ -262,7 +267,7 @@ def hamiltonian(figure: Figure, gauss: Orbit, hbvm: Orbit) -> Said:
 
 @drawn("henon-heiles-fates", "Beyond the paper · the escape time is random", WIDTH * 0.66, 3.2)
 def fates(figure: Figure, times: Mapping[str, Sequence[float | None]]) -> Said:
-    """Draw how long neighbouring starts stay: the distribution behind the paper's one number."""
+    """Draw how long neighbouring initial conditions stay: the distribution behind the paper's one number."""
     axes = figure.subplots()
     summary = []
     for family, values in times.items():
@@ -276,7 +281,8 @@ def fates(figure: Figure, times: Mapping[str, Sequence[float | None]]) -> Said:
     axes.set(xlim=(0, T_END), ylim=(0, 1.04), xlabel="time", ylabel="share of orbits still inside")
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
     return (
-        "The same start but for the last bits of one momentum. The motion is chaotic, so the last bit "
+        "The same initial condition except for the last bits of one momentum. The motion is chaotic, so "
+        "the last bit "
         "decides when Gauss lets the orbit out; the paper's single escape time is one draw from this "
         "distribution. Under HBVM none leaves.",
         "; ".join(summary),
@@ -285,13 +291,13 @@ def fates(figure: Figure, times: Mapping[str, Sequence[float | None]]) -> Said:
 
 @drawn("henon-heiles-map", "Beyond the paper · which initial conditions escape", WIDTH, 3.6, values=True)
 def maps(figure: Figure, times_of: Mapping[str, Array]) -> Said:
-    """Escape times over starts and energies, both methods."""
+    """Escape times over initial conditions and energies, both methods."""
     panels = figure.subplots(1, 2, sharey=True)
     high = math.log10(experiment.MAP_END)
     meshes = []
     for axes, (family, times) in zip(panels, times_of.items(), strict=True):
         meshes.append(heat(axes, np.degrees(experiment.DIRECTIONS), GAPS, np.maximum(times, 1.0), 2, high))
-        axes.set(yscale="log", xlabel="direction of the start, degrees", xticks=range(0, 361, 60))
+        axes.set(yscale="log", xlabel="initial direction, degrees", xticks=range(0, 361, 60))
         left = int(np.count_nonzero(~np.isnan(times)))
         axes.set_title(f"{METHODS[family]}: {left} of {times.size} leave", color=INK)
         if left == 0:

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from hbvm_bench.report.document import Claim, Maker
 from hbvm_bench.report.figures.canvas import log_axis, say
 from hbvm_bench.report.figures.style import INK, MUTED, TRUTH
-from hbvm_bench.studies.computations import Part, Results, Task, each
+from hbvm_bench.studies.computations import Part, PartResults, Task, each
 from hbvm_bench.studies.drawn import COLOURS, WIDTH, Said, drawn, legend_above, number
 from hbvm_bench.studies.paper.experiments import others
 from hbvm_bench.studies.paper.experiments import period_annulus as experiment
@@ -32,8 +32,9 @@ from problems.catalogue.period_annulus import C_STAR, H_STAR, P1, P2
 PROBLEM = (
     "A planar system of degree five with a centre in the origin; its periodic orbits end at a loop through "
     "the saddle P₁. The paper looks for the edge by bisection on the segment from the origin to Q = (0, 1), "
-    "judging each start by the fate of its numerical orbit over 2500 units of time, down to an interval of "
-    "2⁻⁵². (The printed step 2 lets the segment end in P₁; it has to be Q.) A start departs when |q| or |p| "
+    "which judges each point by whether its numerical orbit departs within 2500 units of time, down to "
+    "an interval of "
+    "2⁻⁵². (The printed step 2 lets the segment end in P₁; it has to be Q.) An orbit departs when |q| or |p| "
     "exceeds 1. The exact edge is at c* = 0.37570559292634522367."
 )
 LONG_SPAN = (
@@ -44,7 +45,7 @@ LONG_SPAN = (
 )
 DIGITS = (
     "Why the Gauss entries agree with the paper within a factor and not in their digits: under "
-    "Gauss there is no edge but a layer, see the figure of fates below; the bisection ends at one "
+    "Gauss there is no edge but a layer, see the last figure; the bisection ends at one "
     "of its many boundaries, and the last bit of the arithmetic decides at which."
 )
 FATE_METHODS = (Gauss(s=2, h=1.0), Gauss(s=2, h=0.5), Gauss(s=4, h=0.5), HBVM(k=5, s=2, h=1.0))
@@ -67,7 +68,7 @@ def _runs() -> list[Task]:
     ]
 
 
-def _blocks(results: Results) -> list[Maker]:
+def _blocks(results: PartResults) -> list[Maker]:
     entries = partial(_by_entry, results)
     return [
         ("the problem", lambda: PROBLEM),
@@ -87,12 +88,12 @@ def _blocks(results: Results) -> list[Maker]:
     ]
 
 
-def _by_entry(results: Results, name: str) -> dict[Key, Any]:
+def _by_entry(results: PartResults, name: str) -> dict[Key, Any]:
     """Return what was computed for each entry of Table 1."""
     return {(h, s): results[f"{name} {h} {s}"] for h, s in PRINTED}
 
 
-def _claims(results: Results) -> list[Claim]:
+def _claims(results: PartResults) -> list[Claim]:
     cells: dict[Key, dict[str, Edge]] = _by_entry(results, "cell")
     orbits: dict[str, Path] = results["drawn"]
     rest = max(float(np.abs(experiment.field(point)).max()) for point in (P1, P2))
@@ -113,7 +114,8 @@ def _claims(results: Results) -> list[Claim]:
         Claim(
             "P₁ and P₂ are equilibria, both saddles",
             "16 digits",
-            f"the field at the printed points is ≤ {number(rest)}; eigenvalues ±{rate:.4f} and ±{other:.4f}",
+            f"the vector field at the printed points is ≤ {number(rest)}; eigenvalues ±{rate:.4f} and "
+            f"±{other:.4f}",
             "holds" if rest < 1e-14 and min(rate, other) > 0 else "no",
         ),
         Claim("H* = H(P₁)", "9.050199350868576e-2", f"{level!r}", "holds" if level == H_STAR else "partly"),
@@ -193,8 +195,9 @@ def _limit_table(cells: Mapping[Key, Mapping[str, Edge]], limits: Mapping[Key, t
         "The limit of the long interval",
         ("h", "s", "k", "error in H", "departs at", "H has risen by", "error in H"),
         rows,
-        "The nearest start that departs: when, and by how many H* round-off has raised its H up to then. "
-        "That rise is the error of the entry. Over an interval of 100 there are three revolutions at most, "
+        "The nearest point whose orbit departs: when, and by how much round-off has raised its H by "
+        "then, in units of H*. That rise is the error of the entry. Over an interval of 100 there are "
+        "three revolutions at most, "
         f"and what is left is the spacing of the doubles at c*, which is {number(spacing)} in H/H*.",
         words=(),
         key="table-1-limit",
@@ -220,7 +223,7 @@ def _spread_table(spreads: Mapping[Key, Sequence[float]]) -> Table:
     )
 
 
-def _others(results: Results) -> Table:
+def _others(results: PartResults) -> Table:
     return others.table(
         "period-annulus-others",
         results.each("other", others.PERIOD_ANNULUS),
@@ -299,7 +302,7 @@ def periods(figure: Figure, rows: Sequence[tuple[float, float]]) -> Said:
     )
 
 
-@drawn("period-annulus-fates", "Beyond the paper · why the Gauss entries are what they are", WIDTH, 4.65)
+@drawn("period-annulus-fates", "Beyond the paper · which orbits near the edge depart", WIDTH, 4.65)
 def fates(figure: Figure, series: Mapping[MethodBase, Sequence[tuple[float, float | None]]]) -> Said:
     """Draw when orbits depart, against their distance inside the true edge: why Gauss's entries scatter."""
     panels = figure.subplots(len(series), 1, sharex=True)
@@ -317,11 +320,11 @@ def fates(figure: Figure, series: Mapping[MethodBase, Sequence[tuple[float, floa
         summary.append(f"{name}: {len(gone)} of {len(rows)} depart")
     log_axis(panels[-1], "x", int(np.floor(np.log10(min(FATE_GAPS)))), -1, most=9)
     panels[-1].invert_xaxis()
-    panels[-1].set_xlabel("relative distance of the start inside the true edge, 1 − c/c*")
+    panels[-1].set_xlabel("relative distance of the initial point inside the exact edge, 1 − c/c*")
     figure.supylabel("departs at time (upper row of each: stays)", fontsize=8.5)
     return (
-        "All these starts lie inside the annulus, so all should stay. Under HBVM they do. Under Gauss "
-        "there is no edge but a layer in which starts that stay and starts that depart alternate on "
+        "All these points lie inside the annulus, so all should stay. Under HBVM they do. Under Gauss "
+        "there is no edge but a layer in which points that stay and points that depart alternate on "
         "every scale: the bisection ends at one of many boundaries, and which one depends on the last "
         "bit. That is why the error is reproduced within a factor and the digits are not.",
         "; ".join(summary),

@@ -10,10 +10,10 @@ from matplotlib.figure import Figure
 from hbvm_bench.report.document import Claim, Maker
 from hbvm_bench.report.figures.canvas import log_axis, say
 from hbvm_bench.report.figures.style import INK, MUTED, PAPER, TRUTH
-from hbvm_bench.studies.computations import Part, Results, Task
+from hbvm_bench.studies.computations import Part, PartResults, Task
 from hbvm_bench.studies.drawn import COLOURS, WIDTH, Said, drawn, number
 from hbvm_bench.studies.paper.experiments import properties
-from hbvm_bench.studies.paper.experiments.properties import PAIRS, Order, Row
+from hbvm_bench.studies.paper.experiments.properties import PAIRS, ErrorRow, Order
 from hbvm_bench.summaries.table import Table
 
 PROBLEM = "The theory's statements, each measured on the paper's own polynomial problems."
@@ -34,7 +34,7 @@ RUNS = [
 ]
 
 
-def _blocks(results: Results) -> list[Maker]:
+def _blocks(results: PartResults) -> list[Maker]:
     return [
         ("the methods", lambda: PROBLEM),
         ("the order", lambda: order(results["orders"])),
@@ -43,30 +43,30 @@ def _blocks(results: Results) -> list[Maker]:
     ]
 
 
-def _collocation(residuals: Sequence[Row], defects: Sequence[tuple[str, float]]) -> Table:
+def _collocation(residuals: Sequence[ErrorRow], defects: Sequence[tuple[str, float]]) -> Table:
     residual = "residual of σ′ = Σ Pⱼ ∫ Pⱼ f(σ) at the nodes"
     defect = "|MᵀJM − J|, M the derivative of one step"
     return Table(
-        "Extended collocation conditions, and what is not symplectic",
+        "Extended collocation conditions, and symplecticity",
         ("method", "quantity", "defect"),
         [
             *((f"HBVM(k={k}, s={s}, h=0.5)", residual, number(value)) for k, s, value in residuals),
             *((method, defect, number(value)) for method, value in defects),
         ],
         "The residual is on the quintic, where the integrals are exact from k ≥ 5s/2 on; "
-        "the derivative on Hénon–Heiles. HBVM with k > s conserves the energy and is not "
-        "symplectic; Gauss the other way about.",
+        "the derivative on Hénon–Heiles. HBVM with k > s conserves the energy and is not symplectic; for "
+        "Gauss it is the reverse.",
         words=(0, 1),
         key="claims-collocation",
     )
 
 
-def _claims(results: Results) -> list[Claim]:
+def _claims(results: PartResults) -> list[Claim]:
     off = max(abs(row.slope - 2 * row.s) for row in results["orders"])
     back = max(error for _, error in results["reversal"])
     edge, inside = results["stability"]
-    scans: list[tuple[list[Row], int]] = [(results["cubic"], 3), (results["quintic"], 5)]
-    kept = max(_kept(rows, nu) for rows, nu in scans)
+    scans: list[tuple[list[ErrorRow], int]] = [(results["cubic"], 3), (results["quintic"], 5)]
+    error = max(_largest_error(rows, nu) for rows, nu in scans)
     below = min(error for rows, nu in scans for s, k, error in rows if 2 * k < nu * s and s <= 3)
     same = "; the results are bitwise identical" if results["same bits"] else ""
     ranks_right = results["ranks"] == [s for _, s in PAIRS]
@@ -85,7 +85,7 @@ def _claims(results: Results) -> list[Claim]:
         Claim(
             "It is symmetric",
             "Section 2",
-            f"to t = 100 and back misses the start by {number(back)} at most",
+            f"to t = 100 and back misses the initial state by {number(back)} at most",
             "holds" if back < 1e-12 else "no",
         ),
         Claim(
@@ -104,9 +104,9 @@ def _claims(results: Results) -> list[Claim]:
         Claim(
             "It conserves polynomial H of degree ν exactly when k ≥ νs/2",
             "Section 2",
-            f"relative error ≤ {number(kept)} for all k ≥ νs/2 with ν = 3 and 5; for smaller k and s ≤ 3 it "
+            f"relative error ≤ {number(error)} for all k ≥ νs/2 with ν = 3 and 5; for smaller k and s ≤ 3 it "
             f"is {number(below)} or more",
-            "holds" if kept < 1e-13 else "no",
+            "holds" if error < 1e-13 else "no",
         ),
         Claim(
             "The system to solve has block size s, whatever k",
@@ -159,7 +159,7 @@ def order(figure: Figure, rows: Sequence[Order]) -> Said:
 
 
 @drawn("properties-threshold", "Conservation from k ≥ νs/2", WIDTH, 3.6)
-def threshold(figure: Figure, cubic: Sequence[Row], quintic: Sequence[Row]) -> Said:
+def threshold(figure: Figure, cubic: Sequence[ErrorRow], quintic: Sequence[ErrorRow]) -> Said:
     """Energy error against k for two polynomial Hamiltonians, with the threshold drawn in."""
     left, right = figure.subplots(1, 2, sharey=True)
     _threshold(left, cubic, 3, "Hénon–Heiles, degree 3")
@@ -170,16 +170,16 @@ def threshold(figure: Figure, cubic: Sequence[Row], quintic: Sequence[Row]) -> S
         "Largest relative error of H over [0, 50] with h = 1. Filled: k ≥ νs/2, where the paper "
         "promises exact conservation. The dips to round-off just below it, at high s, are errors below "
         "round-off, not conservation.",
-        f"Largest error for k ≥ νs/2: {_kept(cubic, 3):.1e} for degree 3, {_kept(quintic, 5):.1e} for "
-        "degree 5.",
+        f"Largest error for k ≥ νs/2: {_largest_error(cubic, 3):.1e} for degree 3, "
+        f"{_largest_error(quintic, 5):.1e} for degree 5.",
     )
 
 
-def _kept(rows: Sequence[Row], nu: int) -> float:
+def _largest_error(rows: Sequence[ErrorRow], nu: int) -> float:
     return max(error for s, k, error in rows if 2 * k >= nu * s)
 
 
-def _threshold(axes: Axes, rows: Sequence[Row], nu: int, title: str) -> None:
+def _threshold(axes: Axes, rows: Sequence[ErrorRow], nu: int, title: str) -> None:
     for s in sorted({row[0] for row in rows}):
         k, error = np.array([row[1:] for row in rows if row[0] == s]).T
         exact, look = 2 * k >= nu * s, {"linestyle": "", "marker": MARKERS[s], "markersize": 5}

@@ -1,11 +1,10 @@
-"""The page on the original paper's experiments, from kept results alone: claim, paper, here."""
+"""The page on the original paper's experiments, from stored results alone: claim, paper, here."""
 
 from hbvm_bench.report.document import Section
-from hbvm_bench.report.page import Results as Run
-from hbvm_bench.report.page import block
+from hbvm_bench.report.page import Results, block
 from hbvm_bench.studies.computations import (
     Part,
-    Results,
+    PartResults,
     claims_of,
     computing,
     load,
@@ -21,17 +20,17 @@ COMPUTATIONS = {"compute": computing(NAME, lambda quick: PARTS)}
 
 
 @block
-def claims(run: Run) -> Section:
-    """Return every claim with what the paper gives and what came out."""
+def claims(run: Results) -> Section:
+    """Return every claim with the paper's result and the computed one."""
     return claims_of(_parts(run), "Claim, paper, here", "Claims")
 
 
 @block
-def experiments(run: Run) -> list[Section]:
+def experiments(run: Results) -> list[Section]:
     """Return the section of each experiment."""
     return sections_of(_parts(run))
 
 
-def _parts(run: Run) -> list[tuple[Part, Results]]:
-    kept, records = load(NAME, run.beside), {record.case.method: record for record in run.records}
-    return [(part, Results(part, kept, records)) for part in PARTS]
+def _parts(run: Results) -> list[tuple[Part, PartResults]]:
+    stored, records = load(NAME, run.beside), {record.case.method: record for record in run.records}
+    return [(part, PartResults(part, stored, records)) for part in PARTS]

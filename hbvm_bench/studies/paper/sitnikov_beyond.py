@@ -190,7 +190,7 @@ def chaos(
     left.axvline(critical, color=MUTED, linewidth=0.9, linestyle=(0, (4, 3)))
     say(left, "the paper's ē", (critical, 2.5e-5), (-5, 0), ha="right", fontsize=8, color=MUTED)
     left.set(xlabel="eccentricity e", ylabel="growth rate of an offset, per unit of time")
-    left.set_title("the paper's start, v = 1/2")
+    left.set_title("the paper's initial condition, v = 1/2")
     left.legend(loc="center left", bbox_to_anchor=(0.02, 0.66))
     look: Any = {"color": MUTED, "markersize": 1.3, "alpha": 0.8, "rasterized": True}
     for z, v in (orbit[1:].T for speed, orbit in points if speed != START[1]):
@@ -205,9 +205,9 @@ def chaos(
     along = ", ".join(f"{rate:.1e} after {turn} revolutions" for turn, rate in at.along)
     return (
         "Left: the rate at which a small offset grows. Along the axis it falls with the length of the "
-        "run, as the logarithm of time over time, up to e ≈ 0.8: the orbit of this start is regular "
-        "there. Beyond, it no longer falls, and the orbit is chaotic. Off the axis it is large at every "
-        "eccentricity. Right: orbits of many starts, seen once per revolution. The paper's start is on "
+        "run, as the logarithm of time over time, up to e ≈ 0.8: this orbit is regular there. Beyond, it "
+        "no longer falls, and the orbit is chaotic. Off the axis it is large at every "
+        "eccentricity. Right: many orbits, seen once per revolution. The paper's orbit is on "
         "a closed curve inside the regular region; outside, planetoids wander and leave. Mass of the "
         "planetoid neglected.",
         f"At e = {at.e:g}: along the axis {along}; off the axis {at.across:.3f}, a factor e every "

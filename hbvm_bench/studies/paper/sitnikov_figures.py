@@ -43,8 +43,8 @@ def thrown_out(figure: Figure, run: Orbit, truth: Orbit, neighbours: Sequence[fl
     """sit_fig2: the primaries in their plane, the planetoid in space and time."""
     _trajectories(figure, run, truth, COLOURS["gauss"], T_END)
     return (
-        "Left: the primaries at every step. Right: the planetoid is thrown out; when, and whether it comes "
-        f"back once more, is decided by the last bit. {lost_words(neighbours)}",
+        "Left: the primaries at every step. Right: the planetoid is thrown out; the last bit decides "
+        f"when, and whether it comes back once more. {lost_words(neighbours)}",
         _reached(run),
     )
 
@@ -67,12 +67,15 @@ def stays(figure: Figure, run: Orbit, truth: Orbit, ellipses: Sequence[Array]) -
 
 
 def lost_words(times: Sequence[float | None]) -> str:
-    """Return what neighbouring starts do, as a sentence: when they lose the planetoid, if they do."""
+    """Say when neighbouring initial conditions lose the planetoid, if they do."""
     lost = sorted(time for time in times if time is not None)
     if not lost:
-        return f"None of {len(times)} starts that differ in the last bits of e loses the planetoid."
+        return (
+            f"None of {len(times)} initial conditions that differ in the last bits of e loses the planetoid."
+        )
     return (
-        f"Of {len(times)} starts that differ in the last bits of e, {len(lost)} lose the planetoid, the "
+        f"Of {len(times)} initial conditions that differ in the last bits of e, {len(lost)} lose the "
+        "planetoid, the "
         f"first at t = {lost[0]:.0f}, the last at {lost[-1]:.0f}."
     )
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from hbvm_bench.report.document import Claim, Maker
 from hbvm_bench.store.records import Record, Value
-from hbvm_bench.studies.computations import Part, Results, Task, each, split
+from hbvm_bench.studies.computations import Part, PartResults, Task, each, split
 from hbvm_bench.studies.drawn import number
 from hbvm_bench.studies.paper import sitnikov_beyond as beyond
 from hbvm_bench.studies.paper import sitnikov_figures as figures
@@ -50,7 +50,7 @@ def _runs() -> list[Task]:
     ]
 
 
-def _blocks(results: Results) -> list[Maker]:
+def _blocks(results: PartResults) -> list[Maker]:
     def run(name: str) -> Orbit:
         return results["orbits"][name]
 
@@ -61,7 +61,7 @@ def _blocks(results: Results) -> list[Maker]:
         ("Figure 3", lambda: figures.stays(run("hbvm"), run("fine"), results["ellipses"])),
         ("Figure 4", lambda: figures.distances(results["orbits"])),
         ("Figure 5", lambda: figures.errors(results["orbits"])),
-        ("energy and angular momentum together", lambda: _both_laws(results["orbits"])),
+        ("energy and angular momentum together", lambda: _both_invariants(results["orbits"])),
         ("nodes", lambda: beyond.by_nodes(results.each("nodes", NODE_STEPS))),
         ("steps", lambda: beyond.by_step(_steps(results))),
         ("step sizes", lambda: beyond.step_table(_steps(results))),
@@ -73,22 +73,22 @@ def _blocks(results: Results) -> list[Maker]:
     ]
 
 
-def _claims(results: Results) -> list[Claim]:
+def _claims(results: PartResults) -> list[Claim]:
     runs, steps = results["orbits"], _steps(results)
     return [
         *trajectories(runs, results["neighbours"]),
-        *laws(runs, steps, results[f"nodes {sitnikov.H}"]),
+        *conservation(runs, steps, results[f"nodes {sitnikov.H}"]),
         *dynamics(steps, results["growth"]),
     ]
 
 
-def _steps(results: Results) -> list[StepRow]:
+def _steps(results: PartResults) -> list[StepRow]:
     """Return what Gauss and HBVM do with each step; either scan begins with the reference solution."""
     return [*results["steps 2"][1:], *results["steps 3"][1:]]
 
 
 def trajectories(runs: Mapping[str, Orbit], times: Sequence[float | None]) -> list[Claim]:
-    """Return the claims on where the bodies go; ``times`` are those at which neighbouring starts are lost."""
+    """Return the claims on where the bodies go; ``times`` are those at which neighbours are lost."""
     gauss, hbvm, truth = runs["gauss"], runs["hbvm"], runs["truth"]
     apart = np.abs(hbvm.z - truth.z)
     early = float(apart[hbvm.t <= figures.SHOWN].max())
@@ -132,7 +132,7 @@ def trajectories(runs: Mapping[str, Orbit], times: Sequence[float | None]) -> li
     ]
 
 
-def laws(
+def conservation(
     runs: Mapping[str, Orbit], steps: Sequence[StepRow], nodes: Sequence[tuple[int, float, float | None]]
 ) -> list[Claim]:
     """Return the claims on energy and angular momentum; ``nodes`` is the scan over k at the paper's step."""
@@ -179,7 +179,7 @@ def dynamics(steps: Sequence[StepRow], growth: Sequence[Growth]) -> list[Claim]:
     at = min(growth, key=lambda entry: abs(entry.e - sitnikov.E))
     limit = chaotic_from(growth)
     regular = limit is None or limit > sitnikov.E
-    largest = {family: kept(steps, family) for family in ("gauss", "hbvm")}
+    largest = {family: largest_step(steps, family) for family in ("gauss", "hbvm")}
     return [
         Claim(
             "The large step causes a sham, uniform rotation that does not destroy the symmetry",
@@ -195,7 +195,7 @@ def dynamics(steps: Sequence[StepRow], growth: Sequence[Growth]) -> list[Claim]:
             f"with e = {sitnikov.E:g} an offset along the axis grows at a rate of {number(at.along[0][1])} "
             f"over {at.along[0][0]} revolutions and {number(at.along[-1][1])} over {at.along[-1][0]}, "
             f"as for a {'regular' if regular else 'chaotic'} orbit. "
-            + (f"This start becomes chaotic at e ≈ {limit:g}. " if limit is not None else "")
+            + (f"This orbit becomes chaotic at e ≈ {limit:g}. " if limit is not None else "")
             + f"Off the axis offsets grow by a factor e every {1 / at.across:.1f} units of time",
             "no" if regular else "holds",
         ),
@@ -226,8 +226,8 @@ def chaotic_from(growth: Sequence[Growth]) -> float | None:
     return None
 
 
-def kept(steps: Sequence[StepRow], family: str) -> float:
-    """Return the largest h up to which every step keeps the planetoid to the end."""
+def largest_step(steps: Sequence[StepRow], family: str) -> float:
+    """Return the largest h up to which no step loses the planetoid before the end."""
     rows = sorted((row for row in steps if row.family == family and row.s == 2), key=lambda row: row.h)
     return max((row.h for row in takewhile(lambda row: row.usable, rows)), default=0.0)
 
@@ -245,8 +245,8 @@ def both(first: bool, second: bool) -> str:
     return "holds" if first and second else "partly" if first or second else "no"
 
 
-def _both_laws(runs: Mapping[str, Orbit]) -> str | None:
-    """Return what the method that keeps both laws does, where there is one."""
+def _both_invariants(runs: Mapping[str, Orbit]) -> str | None:
+    """Return what the method that conserves both does, where there is one."""
     if "both" not in runs:
         return None
     run, off = runs["both"], float(abs(runs["both"].z[-1] - runs["truth"].z[-1]))
@@ -260,7 +260,7 @@ def _both_laws(runs: Mapping[str, Orbit]) -> str | None:
     )
 
 
-def _plainly(results: Results) -> str:
+def _plainly(results: PartResults) -> str:
     result = row(_steps(results), "hbvm", sitnikov.H)
     paper, ours = (
         results.records[text].result for text in ("HBVM(k=18, s=2, h=0.5)", "HBVM(k=16, s=8, h=0.125)")
@@ -271,17 +271,18 @@ def _plainly(results: Results) -> str:
         "What HBVM(18,2) with h = 1/2 gets right: the energy, the length of the primaries' axis and with "
         f"it their period (to {number(result.slow)}), a planetoid that stays. What it gets wrong: the "
         f"direction of the ellipses, which turn by {result.turn:.1f} degrees per revolution, the angular "
-        "momentum, and the planetoid's phase: after a few hundred units of time its height has nothing to "
-        "do with the true one. Nor is the method symplectic. A higher order with a smaller step gets all "
+        "momentum, and the planetoid's phase: after a few hundred units of time its height is unrelated "
+        "to the exact one. The method is not symplectic either. A higher order with a smaller step gets "
+        "all "
         f"of it right: HBVM(16,8) with h = 1/8 has z at t = 1500 to {off}, for {share:.2f} "
-        "times the field evaluations of the paper's run (table of the libraries below)."
+        "times the right-hand-side evaluations of the paper's run (table of the libraries below)."
     )
 
 
 METRICS = ("energy_max", "angular_momentum_max", "guard_max", "z_error", "evaluations")
 
 
-def _others(results: Results) -> Table:
+def _others(results: PartResults) -> Table:
     return others.table(
         "sitnikov-others",
         {text: _row(record) for text, record in results.records.items()},
@@ -295,17 +296,19 @@ def _others(results: Results) -> Table:
         "The same run with other integrators",
         "One setting per method, chosen for accuracy by the authors of this bench. Evaluations: of the "
         "vector field, where the library counts them. `hbvm-bench run sitnikov` has all settings, with "
-        "times. Off the axis the trajectory is another one, and its other numbers say nothing.",
+        "times. A run that leaves the axis follows another trajectory, and its other numbers mean nothing.",
     )
 
 
-def _row(record: Record) -> others.Row:
+def _row(record: Record) -> others.MethodRow:
     if group_of(record) == "ended":
         refused = record.result.outcome == "refused"
-        return others.Row(record.case.method, {}, record.result.reason if refused else status_of(record))
+        return others.MethodRow(
+            record.case.method, {}, record.result.reason if refused else status_of(record)
+        )
     pairs = ((name, record.result.metrics.get(name, Value()).value) for name in METRICS)
     numbers = {name: value for name, value in pairs if value is not None}
-    return others.Row(record.case.method, numbers, _remark(numbers))
+    return others.MethodRow(record.case.method, numbers, _remark(numbers))
 
 
 def _remark(numbers: Mapping[str, float]) -> str:

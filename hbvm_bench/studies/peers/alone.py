@@ -3,7 +3,7 @@
 ``peers.alone:Taylor(tol=1e-15)`` is `integrators.Taylor` with the options that it has, and none of its
 adapter: setting up and compiling are the library's own calls, and the clock runs for one call of the library
 and for reading the state at the end, as it does through the adapter. The vector field is emitted from the
-same definition. Two small helpers of our adapters take part, in neither of which anything is integrated:
+same definition. Two small helpers of the adapters take part, in neither of which anything is integrated:
 `same_arithmetic`, which restores the processor's modes after WHFast512, and `_pointer`, which makes an
 address of REBOUND's a pointer in compiled code.
 """
@@ -88,7 +88,7 @@ class BatchProgram(Program):
     def prepare_batch(
         self, Y0: Array, par: Array | None = None, *, times: Array, t0: float = 0.0
     ) -> Callable[[], Trajectories]:
-        """Set up as many starts at a time as there are lanes; all have the system's own parameters."""
+        """Set up as many trajectories at a time as there are SIMD lanes; all have the system's parameters."""
         n, lanes = len(Y0), self._batch.batch_size
         filled = Y0[np.minimum(np.arange(-(-n // lanes) * lanes), n - 1)]
         parameters = self.system.pack({}) if par is None else np.atleast_2d(par)[0]
@@ -356,7 +356,7 @@ def _pyhamsys(system: System, method: Any) -> Begin:
 
 
 def _alone(method: type[MethodBase]) -> type[MethodBase]:
-    """Return a method of a library with the library's own calls in the place of our adapter."""
+    """Return a method of a library with the library's own calls in place of the adapter."""
     script, program = SCRIPTS[method.library]
 
     def compile(self: MethodBase, system: System) -> Program:  # noqa: A001 -- the protocol's name

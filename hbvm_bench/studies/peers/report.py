@@ -10,8 +10,8 @@ from hbvm_bench.measure import machine
 from hbvm_bench.measure.timing import Spread
 from hbvm_bench.report.document import Block, Items, Note, Section
 from hbvm_bench.report.page import Results, block
-from hbvm_bench.store.kept import Kept
 from hbvm_bench.store.records import Record
+from hbvm_bench.store.stored_run import StoredRun
 from hbvm_bench.summaries import outcomes
 from hbvm_bench.summaries.compilations import SPREAD, spread
 from hbvm_bench.summaries.rows import Task, at_once, reason_of, tasks
@@ -29,7 +29,7 @@ OVERHEAD = 2e-5
 
 DIFFERENCE = 1e-6
 """Most difference of the end states. Measured: 1e-8 for REBOUND, which adds a fixed step to its clock 300,000
-times where our adapter sets it to t0 + n h; 2e-7 for diffrax's LeapfrogMidpoint, whose rounding grows
+times where the adapter sets it to t0 + n h; 2e-7 for diffrax's LeapfrogMidpoint, whose rounding grows
 over 1,500,000 steps; 0 where steps vary."""
 
 A_STEP = 1
@@ -74,7 +74,7 @@ class Pair:
         return slow and spent[0] - spent[-1] > OVERHEAD
 
 
-def pairs(results: Results, run: Kept) -> list[Pair]:
+def pairs(results: Results, run: StoredRun) -> list[Pair]:
     """Return every method of a run with its library alone, in the order of the campaign."""
     result = []
     for task, records in tasks(run.records).items():
@@ -121,7 +121,7 @@ def table(measured: Sequence[Pair]) -> Table:
         rows,
         "Median and quartiles of the ratio of CPU times in each round; the two alternate in one process, "
         f"compiled and set up beforehand; {ALLOWED:g} is allowed, or {OVERHEAD * 1e6:g} microseconds a "
-        "call. The end states of REBOUND's fixed steps differ because it adds up its clock, which our "
+        "call. The end states of REBOUND's fixed steps differ because it adds up its time, which the "
         "adapter sets to whole steps.",
         words=(0, 1),
     )
@@ -138,7 +138,7 @@ def compiled(measured: Sequence[Pair]) -> Table | None:
     if not rows:
         return None
     return Table(
-        "The best of the compilations beside their median",
+        "Best and median of the compilations",
         ("method", "problem", "through", *SPREAD),
         rows,
         "Each compilation, in a fresh process with empty caches, has the median of its samples.",
@@ -156,7 +156,7 @@ def costs(results: Results) -> list[Section]:
     ]
 
 
-def _run(results: Results, run: Kept) -> list[Block]:
+def _run(results: Results, run: StoredRun) -> list[Block]:
     measured_pairs = pairs(results, run)
     refused = [
         f"{pair.bench.case.method} on {pair.task.problem}: {pair.failed}"

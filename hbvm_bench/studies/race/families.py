@@ -48,7 +48,7 @@ FAMILIES: dict[str, Family] = {
 }
 
 
-class Row(NamedTuple):
+class FamilyRow(NamedTuple):
     """The settings of a family with one kind of step; every row has the same number of settings."""
 
     family: str
@@ -60,9 +60,9 @@ class Row(NamedTuple):
         return f"{FAMILIES[self.family].title}, {self.steps}"
 
 
-def row_of(case: Case) -> Row:
+def row_of(case: Case) -> FamilyRow:
     """Return the row that a setting belongs to."""
     method = make_method(case.method)
     family = family_named(case.method)
     family = OURS if is_ours(method) and family != PROJECTION else family
-    return Row(family, FIXED if fixed_step(method) else OWN)
+    return FamilyRow(family, FIXED if fixed_step(method) else OWN)

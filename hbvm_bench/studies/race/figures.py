@@ -12,10 +12,10 @@ from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture, st
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
 from hbvm_bench.report.figures.style import MUTED, PAPER, Look
 from hbvm_bench.store.records import Record
-from hbvm_bench.studies.race.families import FAMILIES, FIXED, OURS, OWN, Row
+from hbvm_bench.studies.race.families import FAMILIES, FIXED, OURS, OWN, FamilyRow
 from hbvm_bench.studies.race.results import ENERGY, POSITION, Race, counts
 from hbvm_bench.studies.race.tables import power
-from hbvm_bench.summaries.points import family_of, front, number
+from hbvm_bench.summaries.points import family_of, number, pareto_front
 from hbvm_bench.summaries.standings import TIME
 
 FLOOR = -17  # power of ten: smaller errors, exactly 0 among them, are drawn here
@@ -61,7 +61,7 @@ def _panel(
     title: str,
     level: float,
     key: str,
-    rows: Mapping[Row, Sequence[Record]],
+    rows: Mapping[FamilyRow, Sequence[Record]],
     look: Mapping[str, Look],
 ) -> Panel:
     """Draw one error against time, and return the same for the page."""
@@ -74,13 +74,13 @@ def _panel(
     axes.axhline(level, color=MUTED, linewidth=0.8, linestyle=(0, (3, 3)))
     marks, lines = [], []
     for row, records in rows.items():
-        line = front(records, lambda o: (_seconds(o), _error(o, key)))
+        line = pareto_front(records, lambda o: (_seconds(o), _error(o, key)))
         x, y = np.array([(_seconds(o), _height(o, key)) for o in line]).T
         colour, own = look[family_of(records[0])].light, row.steps == OWN
         axes.plot(x, y, color=colour, linewidth=1.1, linestyle=DOTTED if own else "solid")
         if len(line) > 1:
             number, note = look[family_of(line[0])].number, "on the Pareto front of its row"
-            lines.append(Trace(number, f"best of {row.title}", x, y, "law", note))
+            lines.append(Trace(number, f"best of {row.title}", x, y, "fit", note))
         for record in records:
             mark = look[family_of(record)]
             axes.plot(
@@ -100,7 +100,7 @@ def _panel(
         title,
         Axis(SECONDS, log=True),
         Axis(title, log=True),
-        [*marks, *lines, Trace(0, "required accuracy", *asked_for, "law")],
+        [*marks, *lines, Trace(0, "required accuracy", *asked_for, "fit")],
     )
 
 

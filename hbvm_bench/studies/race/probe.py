@@ -1,6 +1,6 @@
 """What a fresh process pays before its first result, with empty and with filled caches.
 
-``python -m hbvm_bench.studies.race.probe PROBLEM METHOD`` integrates a thousandth of the span
+``python -m hbvm_bench.studies.race.probe PROBLEM METHOD`` integrates a thousandth of the interval
 and prints the seconds as JSON; `probe` starts it with caches of its own.
 """
 

@@ -1,4 +1,4 @@
-"""What a race says, problem by problem: read off the results of its campaign."""
+"""What a race shows, problem by problem, from the results of its campaign."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -10,14 +10,14 @@ from hbvm_bench.campaign.file import Campaign, ProblemEntry, name_of
 from hbvm_bench.campaign.file import load as load_campaign
 from hbvm_bench.measure import machine
 from hbvm_bench.report.page import Results
-from hbvm_bench.store.kept import Kept
 from hbvm_bench.store.records import Record
-from hbvm_bench.studies.race.families import OURS, Row, row_of
+from hbvm_bench.store.stored_run import StoredRun
+from hbvm_bench.studies.race.families import OURS, FamilyRow, row_of
 from hbvm_bench.studies.race.probe import PROBES, Probe
 from hbvm_bench.summaries import standings
 from hbvm_bench.summaries.goals import Verdict, verdicts
 from hbvm_bench.summaries.points import number
-from hbvm_bench.summaries.standings import Comparison
+from hbvm_bench.summaries.standings import SettingComparison
 from problems.errors import InputError
 
 NAME = "race"
@@ -32,7 +32,7 @@ class Race:
     ----------
     entry : ProblemEntry
         What the campaign says of it.
-    run : Kept
+    run : StoredRun
         The run it belongs to.
     records : list of Record
         One per setting, in the order of declaration.
@@ -41,7 +41,7 @@ class Race:
     """
 
     entry: ProblemEntry
-    run: Kept
+    run: StoredRun
     records: list[Record]
     probes: list[Probe] = field(default_factory=list)
 
@@ -85,9 +85,9 @@ class Race:
         return min(record.finished for record in self.records)
 
     @cached_property
-    def rows(self) -> dict[Row, list[Record]]:
+    def rows(self) -> dict[FamilyRow, list[Record]]:
         """The settings by row, in the order of declaration."""
-        records_of: dict[Row, list[Record]] = {}
+        records_of: dict[FamilyRow, list[Record]] = {}
         for record in self.records:
             records_of.setdefault(row_of(record.case), []).append(record)
         return records_of
@@ -120,19 +120,19 @@ class Race:
         compared = [record for records in self.competing.values() for record in records]
         return verdicts(self.run.index.campaign, compared)
 
-    def settings(self, who: str | Row) -> list[Record]:
+    def settings(self, who: str | FamilyRow) -> list[Record]:
         """Return all settings of a family, or of one of its rows."""
-        return self.rows.get(who, []) if isinstance(who, Row) else standings.among(self.records, who)
+        return self.rows.get(who, []) if isinstance(who, FamilyRow) else standings.among(self.records, who)
 
-    def best(self, who: str | Row, energy: float, position: float) -> Record | None:
+    def best(self, who: str | FamilyRow, energy: float, position: float) -> Record | None:
         """Return the fastest setting with errors at most these, if there is one.
 
         Of a row it is chosen from all settings, of a family from those that compete.
         """
-        able = self.settings(who) if isinstance(who, Row) else self.competing.get(who, [])
+        able = self.settings(who) if isinstance(who, FamilyRow) else self.competing.get(who, [])
         return standings.best(able, {ENERGY: energy, POSITION: position})
 
-    def at(self, family: str, energy: float, position: float) -> Comparison:
+    def at(self, family: str, energy: float, position: float) -> SettingComparison:
         """Compare the best settings of a peer and of HBVM and Gauss at one accuracy."""
         ours, theirs = (self.best(who, energy, position) for who in (OURS, family))
         return standings.compare(ours, theirs, chosen=True)
@@ -174,7 +174,7 @@ def probes(results: Results) -> list[Probe]:
         raise InputError(f"the compile times of the race are damaged: {error}.") from None
 
 
-def _contests(runs: Sequence[Kept], measured: Sequence[Probe]) -> list[Race]:
+def _contests(runs: Sequence[StoredRun], measured: Sequence[Probe]) -> list[Race]:
     races = {
         name_of(entry): Race(
             entry, run, records, [probe for probe in measured if probe.problem == name_of(entry)]

@@ -7,14 +7,14 @@ from statistics import median
 from hbvm_bench.measure import machine
 from hbvm_bench.measure.timing import Spread
 from hbvm_bench.store.records import Record
-from hbvm_bench.studies.race.families import FAMILIES, OURS, Row
+from hbvm_bench.studies.race.families import FAMILIES, OURS, FamilyRow
 from hbvm_bench.studies.race.probe import Probe
 from hbvm_bench.studies.race.results import ERRORS, Race, counts
 from hbvm_bench.summaries import accuracies, compilations, outcomes, standings
 from hbvm_bench.summaries.goals import ratio_text
 from hbvm_bench.summaries.goals import table as goals_table
 from hbvm_bench.summaries.rows import format_metric, group_of, seconds, status_of
-from hbvm_bench.summaries.standings import Comparison
+from hbvm_bench.summaries.standings import SettingComparison
 from hbvm_bench.summaries.table import NONE, Table
 
 LEVELS = tuple(10.0**-digits for digits in range(8, 15))
@@ -339,7 +339,7 @@ def time_of(record: Record) -> str:
     return f"{seconds(time.median)}{spread}"
 
 
-def _headline_cell(race: Race, peer: str, comparison: Comparison) -> str:
+def _headline_cell(race: Race, peer: str, comparison: SettingComparison) -> str:
     if peer not in race.families:
         return NONE
     if comparison.theirs is None:
@@ -349,7 +349,7 @@ def _headline_cell(race: Race, peer: str, comparison: Comparison) -> str:
     )
 
 
-def _level_cell(comparison: Comparison) -> str:
+def _level_cell(comparison: SettingComparison) -> str:
     if comparison.theirs is None:
         return "not reached"
     return (
@@ -357,7 +357,7 @@ def _level_cell(comparison: Comparison) -> str:
     )
 
 
-def _why_none(race: Race, who: str | Row) -> str:
+def _why_none(race: Race, who: str | FamilyRow) -> str:
     records = race.settings(who)
     if records and all(record.result.outcome == "refused" for record in records):
         return "does not apply"

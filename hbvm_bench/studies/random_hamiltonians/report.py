@@ -1,4 +1,4 @@
-"""The page on random Hamiltonians, from kept results alone."""
+"""The page on random Hamiltonians, from stored results alone."""
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -9,11 +9,10 @@ from matplotlib.figure import Figure
 
 from hbvm_bench.report.document import Items, Maker, Note, Section
 from hbvm_bench.report.figures.style import INK, MUTED
-from hbvm_bench.report.page import Results as Run
-from hbvm_bench.report.page import block
+from hbvm_bench.report.page import Results, block
 from hbvm_bench.studies.computations import (
     Part,
-    Results,
+    PartResults,
     Task,
     computing,
     load,
@@ -51,7 +50,7 @@ def parts(*, quick: bool) -> list[Part]:
     methods = QUICK_METHODS if quick else METHODS
     tasks = [Task(f"of {i}", partial(outcomes, list(piece), methods)) for i, piece in enumerate(pieces)]
 
-    def blocks(results: Results) -> list[Maker]:
+    def blocks(results: PartResults) -> list[Maker]:
         outcomes = [outcome for i in range(len(pieces)) for outcome in results[f"of {i}"]]
         return [
             ("how often", lambda: wrong(outcomes, position, "position", POSITION)),
@@ -70,11 +69,11 @@ COMPUTATIONS = {"compute": computing(NAME, lambda quick: parts(quick=quick))}
 
 
 @block
-def trials(run: Run) -> list[Section]:
-    """Return what came out."""
-    kept = load(NAME, run.beside)
+def trials(run: Results) -> list[Section]:
+    """Return the results."""
+    stored = load(NAME, run.beside)
     quick = run.runs[-1].index.campaign.quick
-    return sections_of([(part, Results(part, kept)) for part in parts(quick=quick)])
+    return sections_of([(part, PartResults(part, stored)) for part in parts(quick=quick)])
 
 
 def position(outcome: Outcome, trial: Trial) -> float:
@@ -277,7 +276,8 @@ ENERGY = (
 HOW = (
     f"{COUNT} problems of {len(FAMILIES)} families, drawn from the seed {SEED}: "
     "`hbvm_bench.studies.random_hamiltonians.systems.problem(number)` returns each. Five problems in a row "
-    "have one formula and their own coefficients, start and interval; the intervals of shares take all as "
+    "have one formula and their own coefficients, initial state and interval; the intervals of shares "
+    "take all as "
     f"independent. Every method is asked for {TOLERANCE:g}; `HBVM()`, `Taylor()` and `IAS15` choose their "
     "accuracy themselves and are judged by the same. `atol=1e-06` is SciPy's default. Radau, which takes "
     f"seconds, has {SLOW_DRAWS} of the {DRAWS} problems of each formula. References: two computations in "

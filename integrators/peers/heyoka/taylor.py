@@ -80,7 +80,7 @@ class Taylor(MethodBase):
     sequence of steps does not depend on the samples. The step to a sample that is far ahead
     is taken twice, for heyoka's compiled loop shortens its last one; these are counted apart,
     in ``stats.extra["side_steps"]``. ``"stop"`` shortens steps onto the samples, as
-    heyoka's ``propagate_until`` does. heyoka has no count of field evaluations.
+    heyoka's ``propagate_until`` does. heyoka does not count right-hand-side evaluations.
 
     Examples
     --------
@@ -185,7 +185,7 @@ class TaylorProgram(ProgramBase):
         times: ArrayLike,
         t0: float = 0.0,
     ) -> Trajectories:
-        """Integrate many starts to the same times by heyoka's batch integrator.
+        """Integrate many initial conditions to the same times by heyoka's batch integrator.
 
         It is compiled when this is first called. Every lane has steps of its own; the
         last one to each time is shortened onto it. A trajectory that fails or stalls has its

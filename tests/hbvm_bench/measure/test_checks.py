@@ -7,7 +7,7 @@ from hbvm_bench.campaign.file import Checks, Ensemble, TimingPlan
 from hbvm_bench.campaign.grid import Grid
 from hbvm_bench.measure import raw
 from hbvm_bench.measure.ensemble import EnsembleRun
-from hbvm_bench.measure.measured import measure, with_laws
+from hbvm_bench.measure.measured import measure, with_growth
 from hbvm_bench.measure.metrics import evaluate
 from hbvm_bench.measure.raw import solve
 from hbvm_bench.measure.starts import PERTURBATION, members, scaled
@@ -25,7 +25,7 @@ def measured_with(problem, method, checks, grid=None):
     reversal, more = raw.beside(solution, program, checks)
     result = msgspec.structs.replace(result, reversal=reversal)
     measured = measure(problem, result, series | more, find(problem))
-    return measured, with_laws(measured, checks)
+    return measured, with_growth(measured, checks)
 
 
 def of_ensemble(problem, program, asked):
@@ -55,12 +55,12 @@ def test_a_cloud_begins_with_the_problem_and_fills_its_box():
     assert counts.min() > 200  # 250 each on average, 236 measured at least
 
 
-def test_the_law_of_a_symplectic_method_is_a_bound_and_its_phase_drifts():
+def test_the_error_of_a_symplectic_method_is_bounded_and_its_phase_drifts():
     problem = problems.load("pendulum", t_end=500.0)
     measured, checked = measured_with(problem, Leapfrog(h=0.1, order=4), Checks(starts=3, reversal=0.2))
-    law = checked.laws["energy"]
-    assert law.law == "bounded"
-    assert law.starts == 3
+    growth = checked.growth["energy"]
+    assert growth.kind == "bounded"
+    assert growth.starts == 3
     assert checked.drift["energy"].shape == (3, checked.drift["t"].size)
     assert (checked.drift["energy"] < 0).any() != (checked.drift["energy"] > 0).all()
     assert checked.reversal < 1e-10  # 6.6e-13 measured
@@ -80,15 +80,15 @@ def test_the_phase_error_is_the_time_by_which_a_run_is_ahead():
     assert np.abs(measured.phase[1:] - 1e-5).max() < 1e-10
 
 
-def test_a_run_that_fails_has_no_law_and_says_why():
+def test_a_run_that_fails_has_no_error_growth_and_says_why():
     problem = problems.load("henon_heiles", energy=2.0, t_end=200.0)  # escapes
     measured, checked = measured_with(problem, Gauss(s=2, h=0.5), Checks(starts=3))
     assert not measured.complete
-    assert checked.laws["energy"].law is None
-    assert "ends at t = " in checked.laws["energy"].why
+    assert checked.growth["energy"].kind is None
+    assert "ends at t = " in checked.growth["energy"].why
 
 
-def test_an_ensemble_is_measured_against_the_ends_of_its_witnesses():
+def test_an_ensemble_is_measured_against_the_ends_of_its_reference_subset():
     pytest.importorskip("heyoka")
     problem = problems.load("henon_heiles", energy=0.1, t_end=20.0)
     asked = Ensemble(count=40, spread=0.01)
@@ -121,7 +121,7 @@ def test_parameters_of_an_ensemble_vary_by_their_names():
     measured, _ = of_ensemble(problem, Gauss(s=12, h=0.25).compile(problem.system), asked)
     assert measured.complete
     metrics = evaluate(measured)
-    assert metrics["position_end"].value < 1e-14  # 5.7e-16 measured: witnesses have their parameters
+    assert metrics["position_end"].value < 1e-14  # 5.7e-16 measured: the subset has its parameters
     assert metrics["energy_max"].value < 1e-14  # 3.4e-16 measured
     with pytest.raises(InputError, match="unknown parameter of morse"):
         members(problem, Ensemble(count=2, vary=(("depth", 0.1),)))

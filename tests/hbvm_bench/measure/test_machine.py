@@ -19,9 +19,9 @@ from hbvm_bench.report.markdown import markdown
 from hbvm_bench.report.page import page_of
 from hbvm_bench.run import timing_pass
 from hbvm_bench.store import archive
-from hbvm_bench.store.kept import Kept
 from hbvm_bench.store.records import Timing
 from hbvm_bench.store.store import Store
+from hbvm_bench.store.stored_run import StoredRun
 from hbvm_bench.studies.race import results, tables
 from problems.errors import InputError
 from tests.hbvm_bench.made_up_run import archived, results_of
@@ -90,11 +90,11 @@ PLAN = TimingPlan(rounds=2)
 
 
 def test_the_timing_pass_goes_on_where_only_the_clock_differs():
-    class Kept:
+    class Timed:
         timing = Timing(plan=PLAN, machine=ZEN4)
 
-    assert timing_pass._timing_of(Kept, PLAN, ZEN4 | {"clock_ghz": "2.6"}) == Kept.timing
-    assert timing_pass._timing_of(Kept, PLAN, ZEN5) == Timing(plan=PLAN, machine=ZEN5)
+    assert timing_pass._timing_of(Timed, PLAN, ZEN4 | {"clock_ghz": "2.6"}) == Timed.timing
+    assert timing_pass._timing_of(Timed, PLAN, ZEN5) == Timing(plan=PLAN, machine=ZEN5)
 
 
 RESTRICTED = """
@@ -173,7 +173,7 @@ def test_a_number_stays_with_the_run_that_it_came_from(tmp_path):
     """Its machine, versions, command and date, when another problem is run on the same kind later."""
     first = of(ZEN4 | {"cores": 2})
     later = of(ZEN4 | {"cores": 64, "clock_ghz": "2.6"}, problem="henon_heiles")
-    later = Kept(
+    later = StoredRun(
         index=msgspec.structs.replace(later.index, command="hbvm-bench automatic henon_heiles"),
         records=[
             msgspec.structs.replace(one, versions={"numpy": "3"}, finished="2027-01-02T03:04:05+00:00")

@@ -87,7 +87,7 @@ def test_the_reference_itself_is_right_to_round_off(sitnikov):
     assert got["z_end"].value == pytest.approx(-0.21429082377414022, abs=0)
     # the distance of a double from a number: at most half an ulp of 0.21
     assert got["z_error"].value <= 2.0**-55
-    assert not any(value.void for value in got.values())
+    assert not any(value.excluded for value in got.values())
 
 
 def test_a_guard_that_is_lost_voids_what_needs_the_trajectory(sitnikov):
@@ -97,7 +97,7 @@ def test_a_guard_that_is_lost_voids_what_needs_the_trajectory(sitnikov):
     assert got["guard_max"].value == 1e-3
     for key, value in got.items():
         expected = METRICS[key].same_trajectory and value.value is not None
-        assert value.void == expected, key
+        assert value.excluded == expected, key
     assert "off axis reached 0.001 instead of 0" in got["position_end"].why
 
 
@@ -106,7 +106,7 @@ def test_a_guard_that_is_lost_too_little_to_matter_voids_nothing(sitnikov):
     made.y[3, 7] = 4e-20
     got = values(made)
     assert got["guard_max"].value == 4e-20
-    assert not any(value.void for value in got.values())
+    assert not any(value.excluded for value in got.values())
 
 
 def test_an_energy_that_is_lost_is_another_trajectory(sitnikov):
@@ -114,18 +114,18 @@ def test_an_energy_that_is_lost_is_another_trajectory(sitnikov):
     made.y[-1, 9:] *= 1e10  # the momenta
     got = values(made)
     assert got["energy_max"].value > 1e10
-    assert not got["energy_max"].void  # the fact itself
-    assert got["position_end"].void
+    assert not got["energy_max"].excluded  # the fact itself
+    assert got["position_end"].excluded
     assert got["position_end"].why.startswith("another trajectory: the energy is wrong by ")
 
 
 def test_an_early_end_voids_the_part(sitnikov):
     known = solutions.find(sitnikov)
     got = values(solution(sitnikov, t=known.t[:5], status=Status.STALLED))
-    assert got["energy_max"].void
+    assert got["energy_max"].excluded
     assert got["energy_max"].why == "only to t = 100"
     assert got["position_end"].why == "ended at t = 100"
-    assert not got["compile_seconds"].void
+    assert not got["compile_seconds"].excluded
 
 
 def test_no_samples_and_no_finite_values_are_sentences(sitnikov):

@@ -1,4 +1,4 @@
-"""What is read off the stored integrations is a pure function of them: another rule runs nothing again."""
+"""Readings are pure functions of the stored integrations: another rule runs nothing again."""
 
 from dataclasses import replace
 
@@ -11,7 +11,7 @@ from hbvm_bench.campaign.identity import resolve
 from hbvm_bench.measure import drift, metrics, reading
 from hbvm_bench.reference import solutions
 from hbvm_bench.run import loop
-from hbvm_bench.store.records import Law
+from hbvm_bench.store.records import ErrorGrowth
 from hbvm_bench.store.store import Index, Store
 from hbvm_bench.summaries.rows import rows
 from tests.hbvm_bench.conftest import SHORT, run_case
@@ -55,7 +55,7 @@ def is_complete(store):
 
 def test_the_store_has_what_the_integration_gave_and_nothing_that_judges_it(store):
     for record in store.records():
-        assert (record.result.metrics, record.result.laws, record.result.violation) == ({}, {}, "")
+        assert (record.result.metrics, record.result.growth, record.result.violation) == ({}, {}, "")
         kinds = {name.partition(".")[0] for name in store.series(record.id)}
         assert kinds <= {"t", "y", "extra", "starts", "reversal"}
     series = store.series(store.records()[0].id)
@@ -93,12 +93,12 @@ def test_another_reference_changes_positions_and_needs_no_run(toys, tmp_path, mo
     assert is_complete(store)
 
 
-def test_another_law_needs_no_run(store, monkeypatch):
-    before = reading.records(store)[0].result.laws
+def test_another_growth_needs_no_run(store, monkeypatch):
+    before = reading.records(store)[0].result.growth
     assert before["energy"].starts == 3
-    monkeypatch.setattr(drift, "fit", lambda t, errors, *, signed: Law(law="power", slope=1.0))
+    monkeypatch.setattr(drift, "fit", lambda t, errors, *, signed: ErrorGrowth(kind="power", slope=1.0))
     monkeypatch.setattr(reading, "rule", lambda: "another")
-    assert reading.records(store)[0].result.laws["energy"] == Law(law="power", slope=1.0)
+    assert reading.records(store)[0].result.growth["energy"] == ErrorGrowth(kind="power", slope=1.0)
     assert is_complete(store)
 
 

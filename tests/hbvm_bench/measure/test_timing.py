@@ -51,17 +51,17 @@ class Landing(MethodBase):
 
 def test_a_run_goes_to_its_end_as_the_library_does():
     problem = problems.load("pendulum", t_end=1.0)
-    run = timing.Run.compiled(problem, Landing())
+    run = timing.SingleRun.compiled(problem, Landing())
     run.until(0.5).seconds()
     run.seconds(2)
     assert run.program.asked == ["stop"] * 3
     assert (run.t_end, run.until(0.5).t_end) == (1.0, 0.5)
-    assert timing.Run.compiled(problem, integrators.Gauss(s=2, h=0.1)).sample is None
+    assert timing.SingleRun.compiled(problem, integrators.Gauss(s=2, h=0.1)).sample is None
 
 
 def test_making_a_stepper_is_outside_every_clock():
     problem, program = problems.load("pendulum", t_end=1.0), Noting()
-    assert timing.Run.compiled(problem, Landing(), program).seconds(3, lambda: program.now)[0] == 1.0
+    assert timing.SingleRun.compiled(problem, Landing(), program).seconds(3, lambda: program.now)[0] == 1.0
     starts = np.tile(problem.y0, (4, 1))
     assert ensemble.EnsembleRun(program, starts, problem, "stop").seconds(2, lambda: program.now)[0] == 4.0
     assert set(program.asked) == {"stop"}
@@ -139,7 +139,7 @@ def test_one_sample_has_no_quartiles():
 
 
 def test_timing_takes_the_integration_alone_and_restores_garbage_collection():
-    run = timing.Run.compiled(problems.load("kepler", e=0.6, t_end=3.0), integrators.Gauss(s=4, h=0.1))
+    run = timing.SingleRun.compiled(problems.load("kepler", e=0.6, t_end=3.0), integrators.Gauss(s=4, h=0.1))
     seconds, samples = run.seconds(3)
     assert seconds > 0
     assert samples.t.tolist() == [3.0]
@@ -195,7 +195,9 @@ def test_the_calibration_of_thread_times_is_by_the_same_clock(monkeypatch):
     asked = []
     monkeypatch.setattr(timing, "calibrate", lambda clock: asked.append(clock) or 0.01)
     plan = TimingPlan(rounds=2, interleaved=True, clock="thread", shortest=1e-6)
-    timing.time_together([timing.Run.compiled(problems.load("pendulum", t_end=1.0), Landing())], plan, [0, 1])
+    timing.time_together(
+        [timing.SingleRun.compiled(problems.load("pendulum", t_end=1.0), Landing())], plan, [0, 1]
+    )
     assert asked == 2 * [time.thread_time]
 
 

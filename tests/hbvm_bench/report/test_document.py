@@ -15,6 +15,7 @@ from hbvm_bench.report import html, markdown
 from hbvm_bench.report.document import (
     SHOWN,
     Block,
+    CaseTable,
     Claim,
     Claims,
     Commands,
@@ -26,7 +27,6 @@ from hbvm_bench.report.document import (
     Links,
     Note,
     Notice,
-    Results,
     Section,
     attempt,
     pieces,
@@ -80,10 +80,10 @@ def drawn(text="a figure") -> Picture:
 @pytest.fixture(scope="module")
 def ranked(tmp_path_factory):
     store = made_up_run.write(Store(tmp_path_factory.mktemp("run")), ["pendulum(p=1.0)"], 3)
-    return next(block for block in document(store).walk() if isinstance(block, Results))
+    return next(block for block in document(store).walk() if isinstance(block, CaseTable))
 
 
-def examples(text: str, ranked: Results) -> list[Block]:
+def examples(text: str, ranked: CaseTable) -> list[Block]:
     """Return one block of each kind, all of its words being a text."""
     return [
         text,

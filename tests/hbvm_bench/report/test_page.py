@@ -39,7 +39,7 @@ def test_a_page_has_the_blocks_that_its_campaign_names_in_this_order(store):
     assert made.name == "text.md"
     text = markdown.markdown(made)
     assert text.startswith("# A large campaign\n\nTwo blocks.\n\n## Sources")
-    assert text.index("## Sources") < text.index("## What came out")
+    assert text.index("## Sources") < text.index("## Results")
     assert "Fairness" not in text
 
 
@@ -87,4 +87,4 @@ def test_another_page_of_a_run_integrates_nothing(toys, tmp_path, monkeypatch, c
     assert main(["run", "x.toml", "--out", "nothing", "--report", "r"]) == 2
     assert "unknown block of a page 'source'; did you mean 'sources'" in capsys.readouterr().err
     assert not Path("nothing").exists()
-    assert "What came out" not in Path("r/report.md").read_text(encoding="utf-8")
+    assert "## Results" not in Path("r/report.md").read_text(encoding="utf-8")

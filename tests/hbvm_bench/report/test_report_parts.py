@@ -18,10 +18,10 @@ from hbvm_bench.report.figures.portraits import crossings
 from hbvm_bench.report.index import not_measured, write_index
 from hbvm_bench.report.markdown import markdown
 from hbvm_bench.report.page import document, gather
-from hbvm_bench.store.kept import Kept
 from hbvm_bench.store.merge import merge
 from hbvm_bench.store.records import Load, Result, Timing
 from hbvm_bench.store.store import Index, Store
+from hbvm_bench.store.stored_run import StoredRun
 from problems.errors import InputError
 from tests.hbvm_bench import made_up_run
 
@@ -29,8 +29,8 @@ from tests.hbvm_bench import made_up_run
 def plot(kind: Literal["lines", "dots"] = "lines"):
     x = np.linspace(0.0, 10.0, 101)
     case = Trace(3, 'a "b", c', x, np.where(x > 9.0, np.nan, x**2))
-    law = Trace(3, "a", x, x, role="law", note="t^1/2")
-    return Plot([Panel("p", Axis("x"), Axis("y", log=True), [case, law])], kind)
+    fit = Trace(3, "a", x, x, role="fit", note="t^1/2")
+    return Plot([Panel("p", Axis("x"), Axis("y", log=True), [case, fit])], kind)
 
 
 @settings(max_examples=25, deadline=None)
@@ -129,12 +129,12 @@ def test_the_list_of_reports_says_when_and_where_each_was_measured(tmp_path):
 
     machine: dict[str, str | int] = {"processor": "A", "llvm_processor": "znver5", "vector_bits": 512}
     ours = made_up_run.record(
-        "HBVM()", problem="pendulum()", timing=timed(others=0.02, stolen=0.0), kernel="0123456789abcdef"
+        "HBVM()", problem="pendulum()", timing=timed(others=0.02, steal=0.0), kernel="0123456789abcdef"
     )
-    peer = made_up_run.record("IAS15()", problem="pendulum()", timing=timed(others=0.3, stolen=0.01))
+    peer = made_up_run.record("IAS15()", problem="pendulum()", timing=timed(others=0.3, steal=0.01))
     campaign = Campaign(name="one", problems=["pendulum()"], methods=[MethodEntry(use="HBVM()")])
     index = Index(campaign=campaign, ids=[ours.id], version="0", command="")
-    made_up_run.archived(tmp_path / "one", Kept(index=index, records=[ours, peer]))
+    made_up_run.archived(tmp_path / "one", StoredRun(index=index, records=[ours, peer]))
     (tmp_path / "one" / "report.md").write_text("# A title\n", encoding="utf-8")
     row = "| one | 2026-01-02 | A, znver5-512bit | 0123456789ab | 2% to 30% | 0% to 1% |"
     assert row in write_index(tmp_path).read_text(encoding="utf-8")
@@ -147,7 +147,7 @@ def test_the_list_of_reports_names_the_campaigns_that_have_none_and_a_race_witho
             timing = Timing(rounds=made_up_run.timed([1.0]), machine={"llvm_processor": "znver5"} | features)
             record = made_up_run.record("HBVM()", problem="pendulum()", timing=timing)
             runs.append(
-                Kept(
+                StoredRun(
                     index=Index(campaign=campaign, ids=[record.id], version="0", command=""), records=[record]
                 )
             )

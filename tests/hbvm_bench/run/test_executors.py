@@ -43,7 +43,7 @@ def values(store, chosen):
     """Return everything about cases that is not a matter of time and place."""
     found = {}
     for case in chosen:
-        record = reading.kept(store, store.load(case.id))
+        record = reading.up_to_date(store, store.load(case.id))
         kept = {key: v for key, v in record.result.metrics.items() if key not in COST}
         result = msgspec.structs.replace(record.result, metrics=kept, compile=None, peak_gib=None)
         found[case.id] = (record.case, result, record.versions, store.series(case.id))

@@ -38,7 +38,7 @@ def case(method):
 
 def run(store, method, limits=GENEROUS):
     record = run_case(case(method), str(store.directory), limits)
-    assert reading.kept(store, store.load(record.id)) == record
+    assert reading.up_to_date(store, store.load(record.id)) == record
     return record
 
 
@@ -84,7 +84,7 @@ def test_a_failure_is_a_row_with_its_reason(toys, store, method, outcome, reason
 def test_a_stall_keeps_what_came_before(toys, store):
     record = run(store, "Stalling()")
     assert (record.result.outcome, record.result.reason) == ("stalled", "it crawled.")
-    assert record.result.metrics["energy_max"].void
+    assert record.result.metrics["energy_max"].excluded
     assert store.series(record.id)["t"].tolist() == [0.0, 0.25]
 
 
@@ -143,8 +143,8 @@ def test_a_lost_symmetry_voids_position_and_time(toys, store):
     record = run(store, "Straying()")
     assert "off axis reached 0.001" in record.result.violation
     metrics = record.result.metrics
-    assert metrics["z_end"].void
-    assert not metrics["energy_max"].void
+    assert metrics["z_end"].excluded
+    assert not metrics["energy_max"].excluded
     assert metrics["guard_max"].value == 1e-3
 
 
@@ -165,7 +165,7 @@ def test_timing_keeps_all_samples_and_is_not_taken_twice(toys, store):
         cases, store, PLAN, GENEROUS, lambda round_, one: visits.append((round_, one.case.method))
     )
     assert visits == [(0, "Steady()"), (1, "Steady()")]
-    record = reading.kept(store, store.load(cases[0].id))
+    record = reading.up_to_date(store, store.load(cases[0].id))
     assert [len(one.samples) for one in record.timing.rounds] == [2, 2]
     assert all(0 < one.share < 1.5 for one in record.timing.rounds)
     assert record.timing.compile.seconds == 0.25
@@ -203,7 +203,7 @@ def test_a_timing_that_fails_says_why(toys, store):
     one = resolve(case("Steady(wait=0.5)"))
     run_case(one.case, str(store.directory), GENEROUS)
     timing_pass.time_cases([one], store, PLAN, Limits(wall_seconds=0.1))
-    record = reading.kept(store, store.load(one.id))
+    record = reading.up_to_date(store, store.load(one.id))
     assert record.timing.why == "not timed: the time limit"
     assert record.result.metrics["warm_seconds"].why == "not timed: the time limit"
     assert timing_pass.missing_visits([one], store, PLAN) > 0
@@ -224,7 +224,7 @@ def test_the_cases_of_a_problem_are_timed_in_turn_by_one_process(toys, store):
         cases, store, TOGETHER, GENEROUS, lambda round_, one: visits.append(one.case.method)
     )
     assert visits == ["Steady()"]
-    first, second, crashed, strayed = (reading.kept(store, store.load(one.id)) for one in cases)
+    first, second, crashed, strayed = (reading.up_to_date(store, store.load(one.id)) for one in cases)
     assert crashed.timing is None
     assert (strayed.timing.rounds, strayed.timing.why) == ([], timing_pass.OFF)
     assert first.timing.process == second.timing.process != ""

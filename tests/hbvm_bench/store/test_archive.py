@@ -10,9 +10,10 @@ import pytest
 from hbvm_bench.cli import main
 from hbvm_bench.measure import reading
 from hbvm_bench.report import html, markdown
-from hbvm_bench.report.archived import contents
+from hbvm_bench.report.archived import contents, pictures
 from hbvm_bench.report.page import document
 from hbvm_bench.store import archive
+from hbvm_bench.store.records import ErrorGrowth, Load, Result, Value
 from hbvm_bench.store.store import Store
 from problems.errors import InputError
 from tests.hbvm_bench import made_up_run
@@ -25,6 +26,31 @@ ARCHIVED = sorted(path.parent.name for path in REPORTS.glob(f"*/{archive.NAME}")
 def run(tmp_path_factory):
     store = made_up_run.write(Store(tmp_path_factory.mktemp("run")), ["pendulum(p=1.0)"], 4, missing=1)
     return store, document(store)
+
+
+@pytest.mark.parametrize(
+    ("stored", "here"),
+    [
+        ({"value": 1.0, "void": True, "why": "left"}, Value(value=1.0, excluded=True, why="left")),
+        ({"others": 0.1, "stolen": 0.2}, Load(others=0.1, steal=0.2)),
+        ({"law": "exponential", "growth": 0.25}, ErrorGrowth(kind="exponential", exponential_rate=0.25)),
+    ],
+)
+def test_stored_results_keep_the_names_of_their_fields(stored, here):
+    """JSON output and archives are read by other programs, and by this one in later versions."""
+    assert msgspec.convert(stored, type(here)) == here
+    assert msgspec.to_builtins(here) == stored
+    assert "laws" in msgspec.to_builtins(Result(outcome="ok"))
+
+
+def test_a_former_head_of_a_figure_s_table_has_the_present_name():
+    drawing = archive.Drawing(
+        place="problem-1", key="drift", title="", caption="", summary="", svg="",
+        numbers=[["case", "law"], ["Gauss(s=8, h=0.5)", "t^0.50"]],
+    )  # fmt: skip
+    (picture,) = pictures([drawing], "problem-1")
+    assert picture.numbers is not None
+    assert picture.numbers.head == ("case", "growth")
 
 
 def test_a_page_from_an_archive_is_the_one_from_its_store(run, tmp_path):

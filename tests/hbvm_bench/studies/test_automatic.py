@@ -11,9 +11,9 @@ import pytest
 from hbvm_bench.campaign.identity import is_ours, resolve
 from hbvm_bench.cli import main
 from hbvm_bench.report.page import gather
-from hbvm_bench.store.kept import Kept
 from hbvm_bench.store.records import Timing
 from hbvm_bench.store.store import Index, Store
+from hbvm_bench.store.stored_run import StoredRun
 from hbvm_bench.studies import automatic
 from problems.errors import InputError, UnknownNameError
 from tests.hbvm_bench.made_up_run import record, timed
@@ -38,7 +38,7 @@ def made(machine, ratio=2.0, problem="kepler", worse=1.0):
     index = Index(
         campaign=campaign, ids=[one.id for one in records], version="0", command="hbvm-bench automatic"
     )
-    return Kept(index=index, records=records)
+    return StoredRun(index=index, records=records)
 
 
 def test_both_sides_are_measured_on_the_same_trajectory_and_a_rerun_does_nothing(

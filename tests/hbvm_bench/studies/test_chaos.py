@@ -62,18 +62,18 @@ def decided(name, index, here):
     return report._decided(known, known.published[index], here)
 
 
-def test_a_published_spectrum_that_breaks_an_exact_law_is_told():
+def test_a_published_spectrum_that_breaks_an_exact_relation_is_reported():
     rusyn = decided("rucklidge", 1, made_up("rucklidge", 0.3, 0.305, -3.0))
     assert "add up to -3.0016" in rusyn
-    assert "heyoka's value is 0.3050, inside our interval" in rusyn
+    assert "heyoka's value is 0.3050, inside this interval" in rusyn
     pairs = decided("henon_heiles", 0, made_up("henon_heiles", 0.0, 0.0, 0.0))
-    assert "the published ones add up to 0.0270 and are no pairs" in pairs
+    assert "the published ones add up to 0.0270 and are not paired" in pairs
 
 
 def test_a_published_spectrum_with_the_exact_sum_is_not_called_wrong():
     sprott = decided("rucklidge", 0, made_up("rucklidge", 0.19, 0.5, -3.0))
     assert "the sum does not decide" in sprott
-    assert "outside our interval" in sprott
+    assert "outside this interval" in sprott
 
 
 def test_times_on_a_busy_machine_are_not_judged():
@@ -91,7 +91,7 @@ def test_the_sum_is_compared_with_the_mean_divergence_where_that_is_not_constant
     newer = replace(older, divergence=-5.33 + 1e-12)
     assert report._times({"rossler": newer}).rows[0][5] == "1e-12"
     assert "where that is a constant" in report._times({"rossler": older}).note
-    assert "ours contain its integration" in report._times({"rossler": newer}).note
+    assert "the times of HBVM() contain its integration" in report._times({"rossler": newer}).note
     lorenz = made_up("lorenz", 0.9, 0.9, -41 / 3 + 1e-12)
     assert report._times({"lorenz": lorenz}).rows[0][5] == "1e-12"
 

@@ -58,7 +58,7 @@ def test_more_or_less_time_is_said_where_both_quartiles_say_so(times, verdict):
 
 def test_beside_other_work_nothing_is_judged():
     assert LOOSE.timing is not None
-    busy = replace(LOOSE, timing=replace(LOOSE.timing, load=Load(others=0.2, stolen=0.0)))
+    busy = replace(LOOSE, timing=replace(LOOSE.timing, load=Load(others=0.2, steal=0.0)))
     (table,) = report.summary(members(DEFAULT, busy))
     assert table.rows[0][-1] == "not judged"
     assert report.details(members(DEFAULT, busy)).rows[1][-1].startswith("not judged: other work took 20%")

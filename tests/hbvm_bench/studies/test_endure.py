@@ -85,20 +85,17 @@ def test_a_small_drift_is_a_drift_all_the_same(tmp_path):
     assert float(within.measured) > 2.0  # measured 3.2 times what is called a drift
     ours, _ = endure.lines(result)
     assert ours.drift is not None
-    assert ours.drift.law == "drift"
+    assert ours.drift.kind == "drift"
     (table, _) = endure.tables(result)
     assert "0 of 16 positive" in str(table.rows[0])
-    assert (
-        "more than 3 of its standard errors from 0; of errors that do not drift, chance puts 0.9 %"
-        in table.note
-    )
+    assert "more than 3 standard errors from 0; without a drift, chance exceeds this in 0.9 %" in table.note
 
 
 def test_the_stored_report_and_the_readme_say_the_same():
     stored = Path(__file__).parents[3] / "reports" / "endure"
     page = (stored / "README.md").read_text(encoding="utf-8")
     ours = next(text for text in page.splitlines() if text.replace("`", "").startswith(f"| {OURS} "))
-    if drift.LAWS["drift"] in ours:
+    if drift.KINDS["drift"] in ours:
         readme = (stored.parents[1] / "README.md").read_text(encoding="utf-8")
         assert "grows like the square root of time" not in readme
 
@@ -107,11 +104,11 @@ def test_a_short_run_has_no_goals(tmp_path):
     assert endure.goals(made(tmp_path, years=1e4)) == []
 
 
-def test_the_lines_have_rms_law_and_speed(tmp_path):
+def test_the_lines_have_rms_growth_and_speed(tmp_path):
     ours, peer = endure.lines(made(tmp_path))
     assert set(ours.rms) == {1e4, 1e5, 1e6}
     assert ours.drift is not None
-    assert ours.drift.law == "power"
+    assert ours.drift.kind == "power"
     assert peer.times_ours == pytest.approx(18.0)
 
 

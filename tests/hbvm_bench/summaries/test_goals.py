@@ -59,7 +59,7 @@ def test_a_larger_ratio_is_missed():
 
 def test_energy_alone_ranks_nobody():
     found = judged(Goal(against="Taylor", ratio=1.0, within={"energy_max": 1e-10}))
-    assert (found.verdict, found.why) == ("void", "energy is not ranked without position")
+    assert (found.verdict, found.why) == ("excluded", "energy is not ranked without position")
     said = judged(Goal(against="Taylor", ratio=1.0, within={"energy_max": 1e-10}, alone="chaos"))
     assert said.verdict == "reached"
 
@@ -151,7 +151,7 @@ def test_a_single_round_says_that_it_chose_what_it_compares():
     assert found.why == "from the rounds that chose the settings: there are no others"
 
 
-@pytest.mark.parametrize("load", [Load(others=0.4, stolen=0.0), Load(others=0.0, stolen=0.2)])
+@pytest.mark.parametrize("load", [Load(others=0.4, steal=0.0), Load(others=0.0, steal=0.2)])
 def test_a_speed_measured_beside_other_work_is_not_judged(load):
     def loaded(one):
         return replace(one, timing=replace(one.timing, load=load))
@@ -160,7 +160,7 @@ def test_a_speed_measured_beside_other_work_is_not_judged(load):
     for ratio in (1.0, 100.0):  # neither reached nor missed
         found = judged(Goal(against="Taylor", ratio=ratio), records)
         assert found.verdict == "not judged"
-        assert found.why == f"other work took {max(load.others, load.stolen):.0%} of a core during the timing"
+        assert found.why == f"other work took {max(load.others, load.steal):.0%} of a core during the timing"
         assert not found.reached
     assert judged(Goal(at=100.0, method="Gauss(s=8, h=0.1)"), records).verdict == "not judged"
     energy = Goal(metric="energy_max", at=1e-13, method="Gauss(s=8, h=0.1)")

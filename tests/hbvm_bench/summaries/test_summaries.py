@@ -5,8 +5,8 @@ from msgspec.structs import replace
 
 from hbvm_bench.campaign.file import Ensemble, Grid
 from hbvm_bench.report.figures.style import looks
-from hbvm_bench.store.records import Compile, Law, Load, Timing, TimingRound, Value
-from hbvm_bench.summaries import laws, needs, outcomes, points, rows, standings
+from hbvm_bench.store.records import Compile, ErrorGrowth, Load, Timing, TimingRound, Value
+from hbvm_bench.summaries import growth, needs, outcomes, points, rows, standings
 from tests.hbvm_bench import made_up_run
 
 
@@ -41,7 +41,7 @@ def test_the_front_is_what_nothing_beats_in_both():
         tuple(points.number(one, key) for key in ("warm_seconds", "position_end"))
         for one in families["Gauss"]
     ]
-    assert points.front(places, lambda place: place) == [(1.0, 1e-3), (2.0, 1e-9)]
+    assert points.pareto_front(places, lambda place: place) == [(1.0, 1e-3), (2.0, 1e-9)]
     assert list(families) == ["Gauss", "Taylor"]
     assert points.work_of(RUN) == "warm_seconds"
     assert points.work_of([]) == "evaluations"
@@ -126,57 +126,66 @@ def test_the_matrix_says_what_the_best_setting_did_and_why_others_did_not():
 
 
 @pytest.mark.parametrize(
-    ("law", "text"),
+    ("fitted", "text"),
     [
-        (Law(law="bounded", floor=2e-9), "bounded at 2.0e-09"),
-        (Law(law="bounded"), "0"),
-        (Law(law="power", slope=1.01, slope_low=0.9, slope_high=1.1), "t^1.01 (0.90 to 1.10)"),
-        (Law(law="power", slope=0.5), "t^0.50"),
-        (Law(law="drift", slope=0.57, mean=-8.51e-14, mean_error=9.4e-15), "drift (-8.5e-14 ± 9e-15)"),
-        (Law(law="exponential", growth=0.25), "exp(0.25 t)"),
-        (Law(why="too short"), "too short"),
+        (ErrorGrowth(kind="bounded", floor=2e-9), "bounded at 2.0e-09"),
+        (ErrorGrowth(kind="bounded"), "0"),
+        (ErrorGrowth(kind="power", slope=1.01, slope_low=0.9, slope_high=1.1), "t^1.01 (0.90 to 1.10)"),
+        (ErrorGrowth(kind="power", slope=0.5), "t^0.50"),
+        (
+            ErrorGrowth(kind="drift", slope=0.57, mean=-8.51e-14, mean_error=9.4e-15),
+            "drift (-8.5e-14 ± 9e-15)",
+        ),
+        (ErrorGrowth(kind="exponential", exponential_rate=0.25), "exp(0.25 t)"),
+        (ErrorGrowth(why="too short"), "too short"),
     ],
 )
-def test_a_law_in_a_few_signs(law, text):
-    assert laws.text(law) == text
+def test_the_growth_of_an_error_in_a_few_signs(fitted, text):
+    assert growth.text(fitted) == text
 
 
-def test_laws_are_counted_by_family_on_the_trajectory_only():
+def test_growths_are_counted_by_family_on_the_trajectory_only():
     kept = {
-        "energy": Law(law="bounded", floor=1e-9, starts=16),
-        "angular_momentum": Law(law="power", starts=16),
+        "energy": ErrorGrowth(kind="bounded", floor=1e-9, starts=16),
+        "angular_momentum": ErrorGrowth(kind="power", starts=16),
     }
-    run = [record("Gauss(s=2, h=0.1)", laws=kept), record("Taylor()", laws=kept, violation="lost")]
-    assert laws.by_method(run) == {"Gauss": [kept["energy"]]}
+    run = [record("Gauss(s=2, h=0.1)", growth=kept), record("Taylor()", growth=kept, violation="lost")]
+    assert growth.by_method(run) == {"Gauss": [kept["energy"]]}
 
 
 def test_powers_of_t_are_told_by_their_exponents_and_not_by_names():
-    found = [Law(law="power", slope=0.54, starts=16), Law(law="power", slope=0.53, starts=16)]
-    made = laws.table(
-        [record(f"Gauss(s={s}, h=0.1)", laws={"energy": one}) for s, one in enumerate(found, 1)]
+    found = [
+        ErrorGrowth(kind="power", slope=0.54, starts=16),
+        ErrorGrowth(kind="power", slope=0.53, starts=16),
+    ]
+    made = growth.table(
+        [record(f"Gauss(s={s}, h=0.1)", growth={"energy": one}) for s, one in enumerate(found, 1)]
     )
     assert made is not None
     assert made.head == ("method", "bounded", "t^a", "exp t", "drift", "not clear", "a")
     assert made.rows == [("Gauss", "–", "2", "–", "–", "–", "0.54 (0.53 to 0.54)")]
-    assert made.note.endswith("A root mean square over 16 starts is known to ±18 %.")
+    assert made.note.endswith("A root mean square over 16 initial conditions has an uncertainty of ±18 %.")
 
 
-def test_a_law_from_fewer_than_sixteen_starts_is_not_clear():
-    few = Law(law="power", slope=0.5, slope_low=0.4, slope_high=0.6, starts=15)
+def test_a_growth_from_fewer_than_sixteen_starts_is_not_clear():
+    few = ErrorGrowth(kind="power", slope=0.5, slope_low=0.4, slope_high=0.6, starts=15)
     enough = replace(few, starts=16)
-    assert laws.clear(enough) is enough
-    assert laws.text(laws.clear(few)) == "not clear from 15 initial conditions"
-    assert laws.text(laws.clear(Law(law="bounded", starts=1))) == "not clear from 1 initial condition"
-    made = laws.table([record("Taylor()", laws={"energy": few})])
+    assert growth.clear(enough) is enough
+    assert growth.text(growth.clear(few)) == "not clear from 15 initial conditions"
+    assert (
+        growth.text(growth.clear(ErrorGrowth(kind="bounded", starts=1)))
+        == "not clear from 1 initial condition"
+    )
+    made = growth.table([record("Taylor()", growth={"energy": few})])
     assert made is not None
     assert made.rows == [("Taylor", "–", "–", "–", "–", "1", "–")]
-    assert laws.clear(Law(law="linear", slope=0.9, starts=16)).law == "power"
+    assert growth.clear(ErrorGrowth(kind="linear", slope=0.9, starts=16)).kind == "power"
 
 
 def test_no_drift_is_a_growth_whose_interval_has_that_of_unbiased_rounding():
     def found(low, starts=16):
-        law = Law(law="power", slope=0.55, slope_low=low, slope_high=0.6, starts=starts)
-        return needs._without_drift(record("Taylor()", laws={"energy": law}))
+        fitted = ErrorGrowth(kind="power", slope=0.55, slope_low=low, slope_high=0.6, starts=starts)
+        return needs._without_drift(record("Taylor()", growth={"energy": fitted}))
 
     assert [found(0.45), found(0.51), found(0.45, starts=15)] == [True, False, False]
 
@@ -198,9 +207,9 @@ def test_times_of_a_busy_machine_are_doubtful():
 
     assert outcomes.doubts([timed(1.0, [0.01, 0.01, 0.01, 0.01])]) == []
     assert "disturbed" in outcomes.doubts([timed(0.5, [])])[0]
-    (loaded,) = outcomes.doubts([timed(1.0, [], load=Load(others=0.57, stolen=0.0))])
+    (loaded,) = outcomes.doubts([timed(1.0, [], load=Load(others=0.57, steal=0.0))])
     assert "used 57% of a core, and the steal time was 0% of one; the times are doubtful" in loaded
-    (quiet,) = outcomes.doubts([timed(1.0, [], load=Load(others=0.1, stolen=0.0))])
+    (quiet,) = outcomes.doubts([timed(1.0, [], load=Load(others=0.1, steal=0.0))])
     assert "doubtful" not in quiet
     assert "not steady" in outcomes.doubts([timed(1.0, [0.01, 0.01, 0.03, 0.03])])[0]
     assert "Nothing was timed" in outcomes.doubts([record("Taylor()")])[0]

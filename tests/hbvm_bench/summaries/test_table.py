@@ -92,8 +92,8 @@ def test_groups():
 
 
 def test_a_void_number_is_shown_and_not_ranked():
-    cell = format_value(METRICS["position_end"], Value(value=1e-12, void=True, why="because"))
-    assert (cell.text, cell.void, cell.why) == ("1.0e-12", True, "because")
+    cell = format_value(METRICS["position_end"], Value(value=1e-12, excluded=True, why="because"))
+    assert (cell.text, cell.excluded, cell.why) == ("1.0e-12", True, "because")
     assert cell.sort == float("inf")
 
 

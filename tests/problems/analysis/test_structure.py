@@ -1,4 +1,4 @@
-"""What is read off a system, and which engine accepts which problem."""
+"""What an analysis of a system gives, and which engine accepts which problem."""
 
 import json
 

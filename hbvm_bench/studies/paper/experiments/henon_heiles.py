@@ -54,7 +54,7 @@ class StepRow:
     """What a method does with a step h."""
 
     h: float
-    left: list[float | None]  # when the orbits from neighbouring starts have left
+    left: list[float | None]  # when the orbits from neighbouring initial conditions have left
     agrees: float  # time up to which the orbit is within `AGREES` of the true one
 
 
@@ -98,7 +98,7 @@ def gauss_orbit() -> tuple[int, Orbit]:
 def escapes(
     method: MethodBase, offsets: Sequence[int] = range(NEIGHBOURS), t_end: float = T_END
 ) -> list[float | None]:
-    """Return when the orbits from neighbouring starts have left."""
+    """Return when the orbits from neighbouring initial conditions have left."""
     problem = start()
     program = method.compile(problem.system)
     starts = [neighbour(problem.y0, i) for i in offsets]

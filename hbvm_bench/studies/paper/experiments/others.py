@@ -30,7 +30,7 @@ LOOK = 4.0  # time between two looks at a library's orbit; one that departs blow
 
 
 @dataclass(frozen=True)
-class Row:
+class MethodRow:
     """One method on one problem."""
 
     method: str  # as written
@@ -42,10 +42,10 @@ Found = tuple[dict[str, float], str]  # the numbers, and how it ended
 Columns = Mapping[str, tuple[str, Callable[[float], str]]]  # head: name of the number, how it is written
 
 
-def table(key: str, rows: Mapping[str, Row], columns: Columns, title: str, note: str) -> Table:
-    """Return the table of what came out."""
+def table(key: str, rows: Mapping[str, MethodRow], columns: Columns, title: str, note: str) -> Table:
+    """Return the results as a table."""
 
-    def cells(row: Row) -> list[str]:
+    def cells(row: MethodRow) -> list[str]:
         return [write(row.numbers[name]) if name in row.numbers else NONE for name, write in columns.values()]
 
     return Table(
@@ -58,7 +58,7 @@ def table(key: str, rows: Mapping[str, Row], columns: Columns, title: str, note:
     )
 
 
-def measured(place: str, text: str) -> Row:
+def measured(place: str, text: str) -> MethodRow:
     """Run a method on one of the `PLACES`; one that refuses it, or whose library is missing, says why."""
     run, start = PLACES[place]
     method, problem = make_method(text), start()
@@ -68,7 +68,7 @@ def measured(place: str, text: str) -> Row:
             method.compile(problem.system)
     except InputError as error:
         refused = str(error)
-    return Row(text, {}, refused) if refused is not None else Row(text, *run(method, problem))
+    return MethodRow(text, {}, refused) if refused is not None else MethodRow(text, *run(method, problem))
 
 
 def _on_henon_heiles(method: MethodBase, problem: Problem) -> Found:

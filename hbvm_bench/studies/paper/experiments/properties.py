@@ -28,7 +28,7 @@ MAPPED = (
 # Where the error is asymptotic and above round-off: the finest step and the ratio of two steps.
 ORDER_SPAN = 6.0
 ORDER_STEPS = {1: (64, 512), 2: (24, 192), 3: (16, 96), 4: (12, 48), 5: (10, 30)}
-Row = tuple[int, int, float]
+ErrorRow = tuple[int, int, float]
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ def same_bits(t_end: float = 200.0) -> bool:
     return all(np.array_equal(states(Gauss(s=s, h=0.5)), states(HBVM(k=s, s=s, h=0.5))) for s in DEGREES)
 
 
-def conservation(nu: int) -> list[Row]:
+def conservation(nu: int) -> list[ErrorRow]:
     """Return (s, k, largest relative error of H over [0, 50]) for k = s .. s + 10, of H of degree nu."""
     problem = {3: henon_heiles(energy=0.12), 5: period_annulus(start=0.3)}[nu]
 
@@ -139,7 +139,7 @@ def iterations() -> list[tuple[int, float]]:
     return rows
 
 
-def extended() -> list[Row]:
+def extended() -> list[ErrorRow]:
     """Return (k, s, residual of the extended collocation conditions)."""
     return [(k, s, _residual(k, s)) for k, s in COLLOCATED]
 

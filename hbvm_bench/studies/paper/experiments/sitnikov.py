@@ -129,8 +129,8 @@ def orbits() -> dict[str, Orbit]:
     orbits_ = {"gauss": orbit(GAUSS), "hbvm": orbit(HBVM_18), "fine": orbit(TRUTH)}
     orbits_["truth"] = orbit(TRUTH, every=4)
     if "LineIntegral" in registry.names():
-        laws = ["energy", "angular_momentum"]
-        orbits_["both"] = orbit(registry.create("LineIntegral", k=24, s=4, h=H, invariants=laws))
+        both = ["energy", "angular_momentum"]
+        orbits_["both"] = orbit(registry.create("LineIntegral", k=24, s=4, h=H, invariants=both))
     return orbits_
 
 

@@ -3,9 +3,9 @@ import pytest
 
 from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.campaign.shorter import chosen, quick_run
-from hbvm_bench.store.kept import Kept
 from hbvm_bench.store.records import Counters, Load, Timing
 from hbvm_bench.store.store import Index
+from hbvm_bench.store.stored_run import StoredRun
 from hbvm_bench.studies.race import results
 from hbvm_bench.studies.race.probe import Probe
 from hbvm_bench.studies.race.results import Race
@@ -31,7 +31,7 @@ def record(method, seconds, energy, position, **more):
         **more,
     )
     timing = Timing(
-        rounds=rounds, machine=MACHINE, process="one", call=1e-5, load=Load(others=0.08, stolen=0.0)
+        rounds=rounds, machine=MACHINE, process="one", call=1e-5, load=Load(others=0.08, steal=0.0)
     )
     return msgspec.structs.replace(made, timing=timing if rounds else None)
 
@@ -85,7 +85,7 @@ def made_up(**said):
         )
     ]
     (entry,) = campaign.entries()
-    return Race(entry, Kept(index=index, records=records), records, probes)
+    return Race(entry, StoredRun(index=index, records=records), records, probes)
 
 
 def save(race, directory):

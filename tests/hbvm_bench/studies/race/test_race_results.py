@@ -77,7 +77,7 @@ def with_load(race, load):
 
 
 def test_the_report_says_what_is_doubtful_void_refused_and_quick(race):
-    assert "doubtful" in " ".join(report.remarks(with_load(race, Load(others=0.3, stolen=0.0))))
+    assert "doubtful" in " ".join(report.remarks(with_load(race, Load(others=0.3, steal=0.0))))
     said = " ".join(report.remarks(race))
     assert "doubtful" not in said
     assert "quick run" in said
@@ -116,7 +116,7 @@ def test_the_best_compilation_of_each_family_stands_beside_the_median(race):
 
 
 def test_compile_times_are_shown_where_the_machine_had_no_other_work(race):
-    assert tables.compiling(with_load(race, Load(others=0.3, stolen=0.0))) is None
+    assert tables.compiling(with_load(race, Load(others=0.3, steal=0.0))) is None
     assert tables.compiling(with_load(race, None)).rows[0][2:] == ("2.5 s", "3.5 s")
 
 
@@ -149,8 +149,8 @@ def test_goals_are_listed_with_their_verdict(race):
 
 
 def test_a_race_without_any_valid_run_has_no_figure(race):
-    void = replace(race, records=race.records[5:7])
-    assert work_precision(void, looks([])) is None
+    excluded = replace(race, records=race.records[5:7])
+    assert work_precision(excluded, looks([])) is None
 
 
 def test_fixed_and_adaptive_steps_are_rows_of_their_own_and_the_faster_counts(race):

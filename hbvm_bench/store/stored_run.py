@@ -1,4 +1,4 @@
-"""A run as pages are made of it: what was asked for, and what came out."""
+"""A run as pages are made of it: what was asked for, and the results."""
 
 from collections.abc import Sequence
 
@@ -8,7 +8,7 @@ from hbvm_bench.store.records import Record
 from hbvm_bench.store.store import Index
 
 
-class Kept(msgspec.Struct, frozen=True, kw_only=True):
+class StoredRun(msgspec.Struct, frozen=True, kw_only=True):
     """A run.
 
     Attributes
@@ -16,7 +16,7 @@ class Kept(msgspec.Struct, frozen=True, kw_only=True):
     index : Index
         What was asked for.
     records : list of Record
-        What came out, in the order of the campaign.
+        The results, in the order of the campaign.
     """
 
     index: Index
