@@ -33,7 +33,6 @@ from problems import emit
 from problems.systems.base import System
 
 INFINITY = float("inf")
-UNROLLED = 640  # products of a sweep up to which stages and rows are written out
 ABREAST = 2  # rows of a product side by side: their sums stay in registers, and share its matrix
 MOST_BRANCHED = 16  # lanes up to which a branch for all that are decided pays: with 32 it costs 4 % (Morse)
 
@@ -57,6 +56,8 @@ class Form:
     varying : bool
         Whether every lane has a step of its own length. The matrix is that of a step of 1, the end of the
         step goes to `Group.next_state`, and a lane whose equations are not solved is not alive then.
+    unrolled : bool
+        Whether stages and rows are written out; see `ensemble.prepared.unrolled_for`.
     judged : tuple of int
         Degrees of the Legendre coefficients that such a step is judged by; see `tables.degrees_judged`.
     groups : tuple of tuple of int
@@ -71,6 +72,7 @@ class Form:
     second: bool
     unit: bool
     varying: bool
+    unrolled: bool
     judged: tuple[int, ...]
     groups: Blocks
     vectors: Blocks = ()
@@ -129,7 +131,7 @@ class Steps(Writer):
     field_values: Any
 
     def __init__(self, inner: str, form: Form):
-        super().__init__(inner, form.lanes, unrolled=form.k * form.k * form.rows <= UNROLLED)
+        super().__init__(inner, form.lanes, unrolled=form.unrolled)
         self.form = form
 
     def text(self) -> str:
