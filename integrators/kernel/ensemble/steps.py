@@ -10,7 +10,6 @@ in a lane depends on nothing in the others.
 """
 
 from collections.abc import Callable
-from contextlib import nullcontext
 from dataclasses import dataclass
 from typing import Any
 
@@ -34,7 +33,6 @@ from problems.systems.base import System
 
 INFINITY = float("inf")
 ABREAST = 2  # rows of a product side by side: their sums stay in registers, and share its matrix
-MOST_BRANCHED = 16  # lanes up to which a branch for all that are decided pays: with 32 it costs 4 % (Morse)
 
 
 Blocks = tuple[tuple[int, int, int], ...]
@@ -464,7 +462,7 @@ class Steps(Writer):
         b.store((sweeps + 1.0).where(active, sweeps).value, self.sweeps)
         b.store(left.value, self.left)
         undecided = b.and_(active, left.compare(">=", INFINITY))
-        with b.if_then(self.any(undecided)) if form.lanes <= MOST_BRANCHED else nullcontext():
+        with b.if_then(self.any(undecided)):
             self.judge(undecided, tried)
         b.store(b.and_(b.load(self.active), self.load(self.left).compare(">", 0.0)), self.active)
 
