@@ -17,11 +17,14 @@ from integrators.kernel.native.memory import Numbers, aligned
 from integrators.kernel.tables import Constants
 from problems import emit
 from problems.systems.base import System
+from problems.trace.functions import FUNCTIONS
 from problems.trace.graph import reachable
 
 LANES = 8  # of a register of AVX-512
 SOON = ("const", "symbol", "index", "add", "sub", "mul", "neg", "pow", "sum")  # operations not waited for
 STAGES = 16  # at most: their sums are written out
+UNROLLED = 640  # products of a sweep that are written out, at most
+FEW_ROWS, FEW_CALLS = 4, 3  # where both are exceeded, no products are written out
 ROOM = 4096  # rows of all stages, at most: beyond, a group of trajectories does not fit in the nearest caches
 
 Made = TypeVar("Made")
@@ -64,7 +67,10 @@ class Lanes:
         self.unit, self.varying, self.k = unit and not varying, varying, constants.k
         self.width = width_for(system, second, self.rows, varying)
         judged = tables.degrees_judged(constants.k, constants.s)
-        form = Form(self.width, self.k, self.rows, second, self.unit, varying, judged, groups, vectors)
+        unrolled = unrolled_for(system, second, self.k, self.rows)
+        form = Form(
+            self.width, self.k, self.rows, second, self.unit, varying, unrolled, judged, groups, vectors
+        )
         self._code = compile_steps(system, form, quantity)
         loop = (run_own if varying else run).code()
         self.from_cache = self._code.from_cache and loop.from_cache
@@ -171,6 +177,21 @@ def width_for(system: System, second: bool, rows: int, varying: bool) -> int:
     if rows > 4 or not (varying or waits):
         return LANES
     return 4 * LANES if rows == 1 else 2 * LANES
+
+
+def unrolled_for(system: System, second: bool, k: int, rows: int) -> bool:
+    """Return whether stages and rows are written out, so that a step's values are in registers.
+
+    The field is written out with them. With many exponentials, sines, ... that is more code than the nearest
+    cache has: in loops, steps of Toda lattices of six to eight take 7 to 18 % less, those of a double
+    pendulum with a tangent vector 6 %, and their compilation a third. But a double pendulum alone takes 7 %
+    more, Morse's oscillator with five tangent vectors 21 %, and six rows without functions 2 to 35 %.
+    """
+    nodes = reachable(system.function("force" if second else "field").roots)
+    called = [node for node in nodes if node.op in FUNCTIONS and node.op != "sqrt"]
+    calls = sum(len(node.loop) if node.loop else 1 for node in called)
+    in_loops = rows > FEW_ROWS and calls > FEW_CALLS
+    return k * k * rows <= UNROLLED and not in_loops
 
 
 def lanes_of(

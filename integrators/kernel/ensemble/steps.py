@@ -10,7 +10,6 @@ in a lane depends on nothing in the others.
 """
 
 from collections.abc import Callable
-from contextlib import nullcontext
 from dataclasses import dataclass
 from typing import Any
 
@@ -33,9 +32,7 @@ from problems import emit
 from problems.systems.base import System
 
 INFINITY = float("inf")
-UNROLLED = 640  # products of a sweep up to which stages and rows are written out
 ABREAST = 2  # rows of a product side by side: their sums stay in registers, and share its matrix
-MOST_BRANCHED = 16  # lanes up to which a branch for all that are decided pays: with 32 it costs 4 % (Morse)
 
 
 Blocks = tuple[tuple[int, int, int], ...]
@@ -57,6 +54,8 @@ class Form:
     varying : bool
         Whether every lane has a step of its own length. The matrix is that of a step of 1, the end of the
         step goes to `Group.next_state`, and a lane whose equations are not solved is not alive then.
+    unrolled : bool
+        Whether stages and rows are written out; see `ensemble.prepared.unrolled_for`.
     judged : tuple of int
         Degrees of the Legendre coefficients that such a step is judged by; see `tables.degrees_judged`.
     groups : tuple of tuple of int
@@ -71,6 +70,7 @@ class Form:
     second: bool
     unit: bool
     varying: bool
+    unrolled: bool
     judged: tuple[int, ...]
     groups: Blocks
     vectors: Blocks = ()
@@ -129,7 +129,7 @@ class Steps(Writer):
     field_values: Any
 
     def __init__(self, inner: str, form: Form):
-        super().__init__(inner, form.lanes, unrolled=form.k * form.k * form.rows <= UNROLLED)
+        super().__init__(inner, form.lanes, unrolled=form.unrolled)
         self.form = form
 
     def text(self) -> str:
@@ -462,7 +462,7 @@ class Steps(Writer):
         b.store((sweeps + 1.0).where(active, sweeps).value, self.sweeps)
         b.store(left.value, self.left)
         undecided = b.and_(active, left.compare(">=", INFINITY))
-        with b.if_then(self.any(undecided)) if form.lanes <= MOST_BRANCHED else nullcontext():
+        with b.if_then(self.any(undecided)):
             self.judge(undecided, tried)
         b.store(b.and_(b.load(self.active), self.load(self.left).compare(">", 0.0)), self.active)
 

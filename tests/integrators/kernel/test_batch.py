@@ -160,6 +160,22 @@ def test_the_order_is_that_of_the_method():
     assert 14.0 < coarse / fine < 18.0  # order 4: measured 16.0
 
 
+@pytest.mark.parametrize(
+    ("name", "values", "unrolled"),
+    [
+        ("toda", {}, False),
+        ("toda", {"n": 4}, True),
+        ("double_pendulum", {}, True),
+        ("figure_eight", {}, True),
+    ],
+)
+def test_rows_with_many_functions_are_not_written_out(name, values, unrolled):
+    # Eight exponentials of eight rows: 4 times as long to compile and 7 % more time, where they are.
+    system = problems.load(name, **values).system
+    rows = system.dof if system.separable else system.dim
+    assert prepared.unrolled_for(system, system.separable, 8, rows) is unrolled
+
+
 def test_one_failure_leaves_the_others_alone():
     def H(q, p, m):
         return p[0] * p[0] / 2 - q[0] * m.sqrt(q[0])
