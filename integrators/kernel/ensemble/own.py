@@ -9,8 +9,9 @@ not pass the time of the next sample, but ends there.
 
 from math import log
 
-from integrators.kernel.context import DIVERGED, DONE, Context
+from integrators.kernel.context import DIVERGED, DONE
 from integrators.kernel.ensemble.group import Group
+from integrators.kernel.ensemble.lane import clear, context_at, place, unload, write
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.parts.implicit import FIXED_POINT
@@ -19,7 +20,7 @@ from integrators.kernel.simd.memory import call_steps, put, splat8
 from integrators.kernel.step.anew import reset
 from integrators.kernel.step.begin import INFINITY, is_within_reach
 from integrators.kernel.step.control import defect_power, error_power, is_distinct
-from integrators.kernel.step.kinks import arrived, end_behind, is_near_one
+from integrators.kernel.step.kinks import end_behind, is_near_one
 from integrators.kernel.step.rule import FIRST_RATE, SMALLEST
 from integrators.kernel.step.size import speed_of
 from integrators.kernel.step.vary import (
@@ -29,7 +30,6 @@ from integrators.kernel.step.vary import (
     accepts,
     begin_attempts,
     log_worth,
-    remaining,
     take,
     within,
 )
@@ -37,24 +37,7 @@ from integrators.running import watchdog
 from integrators.running.watchdog import CRAWL_STEPS
 
 group_at = view(Group)
-context_at = view(Context)
 collapsed = compiled(watchdog.collapsed)
-
-
-@compiled
-def place(ctx, d):
-    """Return where component d of (q, p), or of y, is in a state of a `Context`."""
-    if ctx.second == 0:
-        return d
-    rows = ctx.rows
-    return 8 * (d // 4) + 4 + d % 4 if d < rows else 8 * ((d - rows) // 4) + (d - rows) % 4
-
-
-@compiled
-def clear(group, lane):
-    """Forget the lane's values of the field, and their polynomial."""
-    for i in range(group.k * group.rows):
-        group.values[group.lanes * i + lane] = group.ahead[group.lanes * i + lane] = 0.0
 
 
 @compiled
@@ -91,33 +74,6 @@ def load(group, lane):
     group.mark[lane] = group.start_time
     group.samples_written[lane] = 0
     write(group, lane, ctx)
-
-
-@compiled
-def unload(group, lane, arrived):
-    """Take the trajectory from a lane."""
-    i = group.member[lane]
-    group.arrived[i] = arrived
-    group.all_sweeps[i] = int(group.sweeps[lane])
-    group.all_steps[i] = context_at(group.contexts[lane]).counters.steps
-    group.member[lane] = -1
-
-
-@compiled
-def write(group, lane, ctx):
-    """Write the samples that are at the present time; after the last one the trajectory is at its end."""
-    i, dim, count = group.member[lane], group.dim, group.samples_written[lane]
-    while count < group.count:
-        ctx.controller.stop = group.times[count]
-        if remaining(ctx, ctx.controller.stop) != 0.0:
-            break
-        out = group.out + dim * (group.count * i + count)
-        for d in range(dim):
-            out[d] = group.state[group.lanes * d + lane]
-        count += 1
-    group.samples_written[lane] = count
-    if count == group.count:
-        unload(group, lane, 1 if arrived(ctx) else 0)
 
 
 @compiled
