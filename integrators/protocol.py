@@ -40,7 +40,8 @@ by `offers`; without it the method still integrates. The conformance kit checks 
 12. `KeptError`: after ``USER_ERROR``, ``error`` is the exception raised by a user function.
 13. `Events`: ``with_events`` of a program starts steppers that search their steps for events. Such an
     `EventStepper` has the ``search``, and ``look_to``, which searches the next step up to the last time.
-    `Actions`: with ``acts`` these events may change the state and the parameters.
+    `Actions`: with ``acts`` these events may change the state and the parameters. `BatchesEvents`: what
+    ``with_events`` returns integrates many trajectories together.
 14. `Interruptible`: another thread sets ``stop`` of a stepper to interrupt ``advance``. Many trajectories
     with events are integrated in several threads.
 15. `Batches`: ``batch`` of a program integrates many initial conditions faster than one after another, for
@@ -623,6 +624,23 @@ class BatchesAlong(Protocol):
         ------
         problems.errors.InputError
             Where `goes_along` says that it cannot, and as `Batches.batch`.
+        """
+        ...
+
+
+class BatchesEvents(Protocol):
+    """A function that `Events.with_events` returned and that also integrates many trajectories together."""
+
+    def in_lanes(self) -> bool:
+        """Whether `batch` is faster than one after another; it compiles what that needs."""
+        ...
+
+    def batch(
+        self, Y0: ArrayLike, par: ArrayLike | None, times: ArrayLike, t0: float, threads: int
+    ) -> tuple[Trajectories, list[dict[str, Any]]]:
+        """Integrate as `Batches.batch` with a search for the events.
+
+        The second result has the `integrators.solution.Occurrences` of each trajectory by the events' names.
         """
         ...
 

@@ -20,12 +20,17 @@ ONWARD = 1.25  # times that are probably enough to see the next one
 @compiled
 def end_at_action(ctx):
     """Look for events in the solved step ahead, and solve it anew to the first that changes the state."""
-    events, controller = ctx.events, ctx.controller
+    events = ctx.events
     outcome = call_look(events.code, ctx, events.memory)
     if outcome == DONE:
         events.seen = 1
-    if outcome != ACTS:
-        return outcome
+    return solve_to_action(ctx) if outcome == ACTS else outcome
+
+
+@compiled
+def solve_to_action(ctx):
+    """Solve the step ahead anew to the event in it that ends it; the outcome."""
+    events, controller = ctx.events, ctx.controller
     part = (events.time - ctx.t0) - ctx.time_low
     if not is_distinct(part, ctx.t0):
         return ACCUMULATE
