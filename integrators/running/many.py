@@ -80,8 +80,8 @@ def integrate_many(
     HBVM and Gauss with up to 16 stages integrate one trajectory in each SIMD lane; heyoka uses its batch
     integrator; trajectories of other methods are integrated one after another. The result of a trajectory
     and its events depend neither on the others nor on their order or the number of threads; they agree with
-    those of `integrate` up to rounding, or up to the tolerance with adaptive steps. Ctrl-C ends the integration:
-    finished trajectories are returned, and the others have the status ``INTERRUPTED``.
+    those of `integrate` up to rounding, or up to the tolerance with adaptive steps. Ctrl-C ends the
+    integration: finished trajectories are returned, and the others have the status ``INTERRUPTED``.
 
     Parameters
     ----------

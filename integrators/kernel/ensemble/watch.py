@@ -13,16 +13,17 @@ from integrators.kernel.ensemble.group import ACCUMULATES, BY_EVENT, LEFT
 from integrators.kernel.ensemble.lane import clear, context_at, fetch, place, unload, write, write_until
 from integrators.kernel.events.actions import earlier
 from integrators.kernel.events.memory import START, TERMINAL, WHOLE, Search
+from integrators.kernel.events.value import call_entry
 from integrators.kernel.native.attributes import view
+from integrators.kernel.native.engine import ACT, GO_ON
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.parts.kinks import EXTRAPOLATED, NOTHING
 from integrators.kernel.simd.memory import call_look, get, put
-from integrators.kernel.step.act import change, go_on, solve_to_action
 from integrators.kernel.step.begin import INFINITY, set_factors
 from integrators.kernel.step.estimate import estimate
 from integrators.kernel.step.kinks import differs_at_an_end
 from integrators.kernel.step.rule import FIRST_RATE
-from integrators.kernel.step.vary import begin_attempts, take
+from integrators.kernel.step.vary import begin_attempts
 
 search_at = view(Search)
 
@@ -207,16 +208,13 @@ def act(group, lane, ctx, search):
     if ctx.h != wanted and abs(controller.length_after) < abs(wanted):
         controller.length_after = wanted  # it was to end at a sample: what comes after need not be as short
     iterations = ctx.counters.iterations
-    outcome = solve_to_action(ctx)
+    outcome = call_step(search, ACT)
     group.sweeps[lane] += float(ctx.counters.iterations - iterations)
+    if outcome == RENEW and group.renews:
+        renew(group, lane, ctx, search)
+        outcome = DONE
     if outcome == DONE:
-        take(ctx)
-        outcome = change(ctx)
-        if outcome == RENEW and group.renews:
-            renew(group, lane, ctx, search)
-            outcome = DONE
-        if outcome == DONE:
-            outcome = go_on(ctx)
+        outcome = call_step(search, GO_ON)
     if outcome == HALTED and search.halted == TERMINAL:
         end_by_event(group, lane, search, find_last(search))
         return
@@ -226,6 +224,12 @@ def act(group, lane, ctx, search):
         return
     group.stops[group.member[lane]] = ctx.t0
     unload(group, lane, ACCUMULATES if outcome == ACCUMULATE else LEFT)
+
+
+@compiled
+def call_step(search, operation):
+    """Call the compiled steps of single trajectories for the lane that the search looks into."""
+    return call_entry(search.steps, operation, search.own, search.partial, search.asked, search.action_state)
 
 
 @compiled

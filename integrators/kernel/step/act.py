@@ -12,7 +12,7 @@ from integrators.kernel.step.advance import looked, solve
 from integrators.kernel.step.anew import begin_anew
 from integrators.kernel.step.control import is_distinct
 from integrators.kernel.step.finish import commit, finish
-from integrators.kernel.step.vary import attempt
+from integrators.kernel.step.vary import attempt, take
 
 ONWARD = 1.25  # times that are probably enough to see the next one
 
@@ -48,6 +48,16 @@ def solve_to_action(ctx):
         ctx.surfaces.reached = 0
     events.seen, events.acting = 1, CHANGE
     return DONE
+
+
+@compiled
+def end_and_change(ctx):
+    """Take the solved step up to the event in it that ends it, and let that change the state; the outcome."""
+    outcome = solve_to_action(ctx)
+    if outcome != DONE:
+        return outcome
+    take(ctx)
+    return change(ctx)
 
 
 @compiled

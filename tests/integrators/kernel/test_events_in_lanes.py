@@ -185,6 +185,8 @@ def test_a_trajectory_and_its_events_are_the_same_bits_in_any_place_and_on_any_t
         for threads in (1, 2):
             part = integrate_many(problem, method, starts=starts[order], threads=threads, **given)
             assert [bits(part, i) for i in range(len(order))] == [bits(whole, i) for i in order]
+    pieces = integrate_many(problem, method, starts=starts, piece=7, **given)
+    assert [bits(pieces, i) for i in range(n)] == [bits(whole, i) for i in range(n)]
 
 
 def lanes_of(method, problem):
