@@ -71,11 +71,11 @@ class WithEvents:
             if function.error is not None and not isinstance(function.error, Exception):
                 raise function.error
 
-    def in_lanes(self) -> bool:
-        """Whether `batch` integrates trajectories together; see `integrators.protocol.BatchesEvents`."""
+    def goes_in_batches(self) -> bool:
+        """Whether trajectories go in lanes; see `integrators.protocol.BatchesEvents`."""
         return self.program.varying and self.program.program_of_lanes().in_lanes() is not None
 
-    def batch(
+    def find_in_batch(
         self, Y0: ArrayLike, par: ArrayLike | None, times: ArrayLike, t0: float, threads: int
     ) -> tuple[Batch, list[dict[str, Occurrences]]]:
         """Integrate every start to all times; return the trajectories, and what has happened in each."""

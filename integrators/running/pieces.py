@@ -205,7 +205,7 @@ def integrate_with(
 
 def finds_in_batches(start: Any, times: Array) -> bool:
     """Whether what `started_with_events` returned finds the events of such trajectories together."""
-    return times.ndim == 1 and offers(start, BatchesEvents) and start.in_lanes()
+    return times.ndim == 1 and offers(start, BatchesEvents) and start.goes_in_batches()
 
 
 def find_with(
@@ -213,7 +213,7 @@ def find_with(
 ) -> tuple[Trajectories, list[dict[str, Occurrences]]]:
     """Integrate some trajectories and look for their events: in lanes where that can be, or one by one."""
     if finds_in_batches(start, times):
-        return start.batch(starts, par, times, t0, threads)
+        return start.find_in_batch(starts, par, times, t0, threads)
     members = follow(start, starts, par, times, t0, threads)
     return joined([item for item, _ in members], times), [happened for _, happened in members]
 

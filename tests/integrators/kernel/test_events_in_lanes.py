@@ -7,7 +7,7 @@ import pytest
 
 import integrators
 import problems
-from integrators import HBVM, Event, Gauss, Status
+from integrators import HBVM, Event, Gauss, Status, testing
 from integrators.events.event import named
 from integrators.events.members import ending_of
 from integrators.kernel.batch import Work
@@ -86,8 +86,8 @@ def stays_in_lanes(monkeypatch):
 def before(found, stop):
     """Return what has happened clearly before events accumulate: rounding tells how many come then."""
     chosen = np.abs(found.t - stop) > 1e-9
-    columns = (found.t, found.y, found.direction, found.after, found.par)
-    return Occurrences(*(None if column is None else column[chosen] for column in columns))
+    changes = () if found.after is None else (found.after[chosen], found.par[chosen])
+    return Occurrences(found.t[chosen], found.y[chosen], found.direction[chosen], *changes)
 
 
 def apart(found, expected, scale):
@@ -150,6 +150,12 @@ def test_what_happens_in_lanes_is_what_happens_alone(name, method, monkeypatch):
     states, moments = distances(many, starts, problem, method, times, events)
     assert states <= CLOSE[name][0]
     assert moments <= CLOSE[name][1]
+
+
+@pytest.mark.parametrize("method", [HBVM(), HBVM(k=8, s=7, tol=1e-12), Gauss(s=6, tol=1e-10)], ids=repr)
+@pytest.mark.parametrize("problem", [testing.pendulum(), testing.two_bodies()], ids=str)
+def test_batches_with_events_conform(method, problem):
+    assert testing.batches_find_the_events_of_single_trajectories(method, problem) is None
 
 
 @pytest.mark.parametrize("name", ["Henon and Heiles", "Kepler", "pendulum"])
