@@ -40,7 +40,9 @@ by `offers`; without it the method still integrates. The conformance kit checks 
 12. `KeptError`: after ``USER_ERROR``, ``error`` is the exception raised by a user function.
 13. `Events`: ``with_events`` of a program starts steppers that search their steps for events. Such an
     `EventStepper` has the ``search``, and ``look_to``, which searches the next step up to the last time.
-    `Actions`: with ``acts`` these events may change the state and the parameters.
+    `Actions`: with ``acts`` these events may change the state and the parameters. `BatchesEvents`: what
+    ``with_events`` returns can ``find_in_batch`` the events of many trajectories, if it
+    ``goes_in_batches``.
 14. `Interruptible`: another thread sets ``stop`` of a stepper to interrupt ``advance``. Many trajectories
     with events are integrated in several threads.
 15. `Batches`: ``batch`` of a program integrates many initial conditions faster than one after another, for
@@ -630,6 +632,23 @@ class BatchesAlong(Protocol):
         ...
 
 
+class BatchesEvents(Protocol):
+    """A function that `Events.with_events` returned and that also integrates many trajectories together."""
+
+    def goes_in_batches(self) -> bool:
+        """Whether `find_in_batch` can be called; it compiles what that needs."""
+        ...
+
+    def find_in_batch(
+        self, Y0: ArrayLike, par: ArrayLike | None, times: ArrayLike, t0: float, threads: int
+    ) -> tuple[Trajectories, list[dict[str, Any]]]:
+        """Integrate as `Batches.batch` with a search for the events.
+
+        The second result has the `integrators.solution.Occurrences` of each trajectory by the events' names.
+        """
+        ...
+
+
 class PreparedBatches(Protocol):
     """A program whose batches can be prepared, so that the integration can be timed separately."""
 
@@ -713,8 +732,8 @@ class AsHBVM(Protocol):
 
 CAPABILITIES: tuple[type, ...] = (
     Samplings, Destination, KeptError, Checkpoints, Interruptible, EventStepper,
-    Events, Actions, Batches, BatchesAlong, PreparedBatches, Threads, PieceSize, TimeLimit, Variations,
-    Gradients, DoubleDouble, LowParts, AsHBVM,
+    Events, Actions, Batches, BatchesAlong, BatchesEvents, PreparedBatches, Threads, PieceSize, TimeLimit,
+    Variations, Gradients, DoubleDouble, LowParts, AsHBVM,
 )  # fmt: skip
 """All of them."""
 

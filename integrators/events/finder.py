@@ -82,7 +82,7 @@ class EventLog:
     @property
     def reason(self) -> str:
         """Why the integration has ended, as a sentence."""
-        return f"the event {self.terminal!r} ended the integration at t = {self.stop!r}."
+        return ended_by(str(self.terminal), self.stop)
 
     def last(self) -> tuple[float, Array]:
         """Return when the last of all has happened, and the state after it."""
@@ -129,6 +129,11 @@ class EventLog:
             )
         self._pieces, self.counts = [pieces], list(kept["counts"])
         self.terminal, self.stop = kept["terminal"], kept["stop"]
+
+
+def ended_by(name: str, t: float) -> str:
+    """Return why an integration has ended that an event ends, as a sentence."""
+    return f"the event {name!r} ended the integration at t = {t!r}."
 
 
 class Finder(Protocol):

@@ -8,7 +8,16 @@ from typing import Any
 import numpy as np
 
 from integrators.events.finder import Ending
-from integrators.protocol import Array, Interruptible, Status, Trajectories, UserError, offers, telling
+from integrators.protocol import (
+    Array,
+    Interruptible,
+    Samples,
+    Status,
+    Trajectories,
+    UserError,
+    offers,
+    telling,
+)
 from integrators.solution import Occurrences
 
 Member = tuple[Trajectories, dict[str, Occurrences]]
@@ -57,6 +66,15 @@ def own_times(times: Array, i: int) -> Array:
     return times if times.ndim == 1 else times[i][~np.isnan(times[i])]
 
 
+def ending_of(stepper: Any, samples: Samples, t0: float, end: float) -> Ending:
+    """Return how a trajectory ended that has advanced to a time, or failed; look for its last events."""
+    status = samples.status
+    if status is Status.FINISHED:
+        stepper.look_to(end)
+    reached = end if status is Status.FINISHED else stepper.t
+    return Ending.from_search(stepper.search, status, samples.reason, t0, reached)
+
+
 def _single(
     start: Callable[..., Any], y0: Array, par: Array, times: Array, t0: float, stop: threading.Event
 ) -> Member:
@@ -70,11 +88,7 @@ def _single(
     if offers(stepper, Interruptible):
         stepper.stop = stop
     samples = stepper.advance(times)
-    status = samples.status
-    if status is Status.FINISHED:
-        stepper.look_to(end)
-    reached = end if status is Status.FINISHED else stepper.t
-    ending = Ending.from_search(stepper.search, status, samples.reason, t0, reached)
+    ending = ending_of(stepper, samples, t0, end)
     n = ending.count(samples.t, stepper.search)
     y[0, :n], steps[0] = samples.y[:n], stepper.stats.steps
     result = Trajectories(times, y, [ending.status], [ending.reason], np.array([ending.stop]), steps)

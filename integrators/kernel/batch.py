@@ -18,8 +18,10 @@ from typing import Any, Protocol, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from integrators.events.finder import Ending
 from integrators.kernel.context import Context
 from integrators.kernel.ensemble.engine import run, run_own
+from integrators.kernel.ensemble.group import LEFT
 from integrators.kernel.ensemble.prepared import Lanes
 from integrators.kernel.implicit.workspace import Solver
 from integrators.kernel.pace import Pace
@@ -86,7 +88,7 @@ def prepare_batch(
     lanes = program.in_lanes() if work.sample == "partial" else None
     if lanes is None:
         return work.all_alone
-    return partial(work.run, (_Own if lanes.varying else Fixed).planned(lanes, work))
+    return partial(work.run, (Adaptive if lanes.varying else Fixed).planned(lanes, work))
 
 
 def nothing_yet(times: Array, n: int, dim: int) -> Batch:
@@ -118,7 +120,7 @@ class Work:
         size = max(1, n // (width * JOBS * self.threads)) * width
         jobs = deque(range(i, min(i + size, n)) for i in range(0, n, size))
         self.share(lanes.run, [jobs] * min(self.threads, len(jobs)))
-        stayed = lanes.arrived == 1
+        stayed = lanes.arrived != LEFT
         result.steps[stayed] = lanes.steps[stayed]
         result.iterations[stayed] = lanes.sweeps[stayed]
         result.evaluations[stayed] = lanes.lanes.k * lanes.sweeps[stayed]
@@ -158,10 +160,10 @@ class Work:
             return
         stepper.stop = self.stop
         samples = stepper.advance(result.t, sample=self.sample)
-        result.y[i, : samples.t.size] = self.states(stepper, samples)
-        result.y[i, samples.t.size :] = np.nan
-        result.status[i], result.reason[i] = samples.status, samples.reason
-        result.t_stop[i] = result.t[-1] if samples.status is Status.FINISHED else stepper.t
+        ending, count = self.ending(i, stepper, samples)
+        result.y[i, :count] = self.states(stepper, samples)[:count]
+        result.y[i, count:] = np.nan
+        result.status[i], result.reason[i], result.t_stop[i] = ending.status, ending.reason, ending.stop
         stats = stepper.stats
         result.steps[i], result.iterations[i] = stats.steps, stats.iterations or 0
         result.evaluations[i] = stats.evaluations or 0
@@ -171,6 +173,11 @@ class Work:
     def started(self, i: int) -> HBVMStepper:
         """Return a stepper at the start of a trajectory."""
         return self.program.start(self.starts[i], self.parameters[i], self.t0)
+
+    def ending(self, i: int, stepper: HBVMStepper, samples: Samples) -> tuple[Ending, int]:
+        """Return how a trajectory ended, and how many of the samples it reached."""
+        stop = float(self.result.t[-1]) if samples.status is Status.FINISHED else stepper.t
+        return Ending(samples.status, samples.reason, stop), samples.t.size
 
     def states(self, stepper: HBVMStepper, samples: Samples) -> Array:
         """Return what the result has of samples that a stepper has made."""
@@ -192,20 +199,20 @@ class _InLanes:
     def planned(cls, lanes: Lanes, work: Work) -> Self:
         """Plan; allocate."""
         result, n = work.result, len(work.starts)
-        h, more = cls.plan(lanes, work)
+        h, counts, more = cls.plan(lanes, work)
         arrays = {
             "starts": work.starts, "all_par": work.parameters,
             "all_velocity": lanes.velocities(work.parameters),
             "times": np.ascontiguousarray(result.t), "out": result.y, **more,
             "arrived": np.zeros(n, np.int64), "all_sweeps": np.zeros(n, np.int64),
         }  # fmt: skip
-        lanes_ = cls(lanes, work, h, {"count": result.t.size, "trajectories": n}, arrays)
+        lanes_ = cls(lanes, work, h, {"count": result.t.size, "trajectories": n, **counts}, arrays)
         lanes_.spare.append(lanes_.memory())
         return lanes_
 
     @classmethod
-    def plan(cls, lanes: Lanes, work: Work) -> tuple[float, dict[str, Any]]:
-        """Return the step that the matrix is for, and what else `Group` has."""
+    def plan(cls, lanes: Lanes, work: Work) -> tuple[float, dict[str, int], dict[str, Any]]:
+        """Return the step that the matrix is for, and what else `Group` has: numbers and arrays."""
         raise NotImplementedError
 
     def memory(self) -> Any:
@@ -217,6 +224,10 @@ class _InLanes:
         group, side = memory
         return run(group.address, side.address, budget)
 
+    def pace(self) -> Pace:
+        """Return how many steps are taken between two looks at Ctrl-C."""
+        return Pace(CHUNK, self.work.starts.shape[1])
+
     @property
     def steps(self) -> Counts:
         """Steps of every trajectory."""
@@ -224,7 +235,7 @@ class _InLanes:
 
     @property
     def arrived(self) -> Counts:
-        """1 for trajectories that arrived, 0 for those that left."""
+        """How trajectories have left their lanes: `LEFT`, `ARRIVED`, ... of `ensemble.group`."""
         return self.arrays["arrived"]
 
     @property
@@ -240,7 +251,7 @@ class _InLanes:
             memory = self.memory()
         group = memory[0]
         group.sample = -1
-        pace = Pace(CHUNK, self.work.starts.shape[1])
+        pace = self.pace()
         while True:
             try:
                 members = jobs.popleft()
@@ -262,34 +273,34 @@ class Fixed(_InLanes):
     """Fixed steps: a group of trajectories after the other."""
 
     @classmethod
-    def plan(cls, lanes: Lanes, work: Work) -> tuple[float, dict[str, Any]]:
+    def plan(cls, lanes: Lanes, work: Work) -> tuple[float, dict[str, int], dict[str, Any]]:
         times, t0 = work.result.t, work.t0
         h = -work.program.h if times[-1] < t0 else work.program.h
         targets, parts = plan(times, np.full(times.size, t0), h)
-        return h, {"targets": targets, **lanes.parts(parts, h)}
+        return h, {}, {"targets": targets, **lanes.parts(parts, h)}
 
     @property
     def steps(self) -> Counts:
         return np.full(len(self.arrived), self.arrays["targets"].max(initial=0))
 
 
-class _Own(_InLanes):
+class Adaptive(_InLanes):
     """Adaptive steps: in each lane one trajectory after the other."""
 
     @classmethod
-    def plan(cls, lanes: Lanes, work: Work) -> tuple[float, dict[str, Any]]:
-        return 1.0, {"all_steps": np.zeros(len(work.starts), np.int64)}
+    def plan(cls, lanes: Lanes, work: Work) -> tuple[float, dict[str, int], dict[str, Any]]:
+        return 1.0, {}, {"all_steps": np.zeros(len(work.starts), np.int64)}
 
     def memory(self) -> Any:
-        contexts = [self.work.program.contexts()[0] for _ in range(self.lanes.width)]
-        for context in contexts:
+        pairs = [self.work.program.contexts() for _ in range(self.lanes.width)]
+        for context, _ in pairs:
             context.implicit.strategy = self.work.program.solver.strategy
             context.controller.interval = float(abs(self.work.result.t[-1] - self.work.t0))
             self.work.program.limit(context, context.controller.interval)
         group, _ = self.lanes.groups(self.work.t0, self.h, self.numbers, self.arrays)
-        group.point({"contexts": np.array([context.address for context in contexts])})
+        group.point({"contexts": np.array([context.address for context, _ in pairs])})
         group.first_length = self.work.program.first or 0.0
-        return group, contexts
+        return group, pairs
 
     def advance(self, memory: Any, budget: int) -> int:
         return run_own(memory[0].address, budget)

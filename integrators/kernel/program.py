@@ -13,6 +13,7 @@ from integrators.events.event import Event
 from integrators.kernel import tables
 from integrators.kernel.along import batch_along
 from integrators.kernel.batch import Batch, prepare_batch
+from integrators.kernel.batch_events import WithEvents
 from integrators.kernel.context import Context, Shape, blocks, width_of_blocks
 from integrators.kernel.ensemble.prepared import Lanes, compiled_lanes, lanes_of
 from integrators.kernel.events.engine import look
@@ -201,6 +202,11 @@ class HBVMProgram(Compiled):
         return self.kept is None or not self.kept.names
 
     @property
+    def renews(self) -> bool:
+        """Whether other parameters leave the velocities by momentum as they are."""
+        return not self.second or self._velocity_is_fixed
+
+    @property
     def lanes(self) -> bool:
         """Whether the vector field runs on all stages at once, or on one after another."""
         return self.field.note == fields.ON_LANES
@@ -216,9 +222,7 @@ class HBVMProgram(Compiled):
         values = check_parameters(par, self.system)
         return self._stepper(self, check_state(y0, self.system.dim), values, check_start(t0))
 
-    def with_events(
-        self, problem: Problem, events: Mapping[str, Event]
-    ) -> Callable[[ArrayLike, ArrayLike | None, float, float], HBVMStepper]:
+    def with_events(self, problem: Problem, events: Mapping[str, Event]) -> WithEvents:
         """Compile the functions of events; return what starts a trajectory that looks for them.
 
         Its arguments are those of `start`, and the time up to which is looked.
@@ -237,13 +241,7 @@ class HBVMProgram(Compiled):
         }
         look.code()
         self.compile_seconds += binary.clock() - started
-
-        def start(y0: ArrayLike, par: ArrayLike | None, t0: float, end: float) -> HBVMStepper:
-            stepper = self.start(y0, par, t0)
-            stepper.look_for(events, functions, actions, end)
-            return stepper
-
-        return start
+        return WithEvents(self, events, functions, actions)
 
     def batch(
         self,
@@ -283,16 +281,16 @@ class HBVMProgram(Compiled):
             For starts, parameters or times that cannot be used.
         """
         sample = sampling_named(sample)
-        program = self._program_of_lanes() if sample in (None, "partial") else self
+        program = self.program_of_lanes() if sample in (None, "partial") else self
         return prepare_batch(program, Y0, par, times, check_start(t0), sample, threads)()
 
     def prepare_batch(
         self, Y0: ArrayLike, par: ArrayLike | None = None, *, times: ArrayLike, t0: float = 0.0
     ) -> Callable[[], Batch]:
         """Check and allocate all that `batch` needs; return what then does it, once."""
-        return prepare_batch(self._program_of_lanes(), Y0, par, times, check_start(t0))
+        return prepare_batch(self.program_of_lanes(), Y0, par, times, check_start(t0))
 
-    def _program_of_lanes(self) -> "HBVMProgram":
+    def program_of_lanes(self) -> "HBVMProgram":
         """Return the program for many trajectories: itself, unless another takes them in lanes."""
         if self.for_many is None:
             return self

@@ -10,7 +10,7 @@ from integrators.kernel.context import DONE
 from integrators.kernel.events.engine import look
 from integrators.kernel.events.functions import Action, EventFunction
 from integrators.kernel.events.memory import START
-from integrators.kernel.events.search import KernelSearch
+from integrators.kernel.events.search import KernelSearch, room_for
 from integrators.kernel.spare import Pair, Searched, Spare
 from integrators.protocol import UserError
 
@@ -54,7 +54,7 @@ class LastingSearch(KernelSearch):
         for name in FRESH:
             getattr(memory, name)[:] = 0
         self._hits = EventLog(events, memory.sign, self._dim, memory.parameters)
-        self._make_room(self._first_room)
+        self._make_room(room_for(max(self._dim, memory.parameters)))
         if self._look(START) != DONE:
             error = self._error
             raise UserError(error) from error

@@ -630,11 +630,16 @@ class HBVMStepper(ABC):
                 return status, reason
             return Status.EVENT, self.search.hits.reason
         if outcome == ACCUMULATE:
-            return Status.STALLED, (
-                f"events that change the state accumulate at t = {self.t!r}: the times between them become "
-                "too short to be told from none, or the state stays where the event happens."
-            )
+            return accumulated(self.t)
         return failure(outcome, self._program, (self._context, self._partial), self.t, self._solver)
+
+
+def accumulated(t: float) -> tuple[Status, str]:
+    """Return the status of a trajectory whose events accumulate at a time, and the reason as a sentence."""
+    return Status.STALLED, (
+        f"events that change the state accumulate at t = {t!r}: the times between them become "
+        "too short to be told from none, or the state stays where the event happens."
+    )
 
 
 def failure(

@@ -13,7 +13,6 @@ from integrators import registry
 from integrators.ensemble import Solutions
 from integrators.events.event import Event, named
 from integrators.events.finder import started_with_events
-from integrators.events.members import follow
 from integrators.options import Count
 from integrators.protocol import (
     SAMPLINGS,
@@ -35,10 +34,11 @@ from integrators.running.pieces import (
     Search,
     digest,
     find_in_piece,
+    find_with,
+    finds_in_batches,
     in_batches,
     integrate_piece,
     integrate_with,
-    joined,
 )
 from integrators.running.variations import check as check_vectors
 from integrators.running.variations import directions_of_each
@@ -79,9 +79,9 @@ def integrate_many(
 
     HBVM and Gauss with up to 16 stages integrate one trajectory in each SIMD lane; heyoka uses its batch
     integrator; trajectories of other methods are integrated one after another. The result of a trajectory
-    depends neither on the others nor on their order or the number of threads; it agrees with that of
-    `integrate` up to rounding, or up to the tolerance with adaptive steps. Ctrl-C ends the integration:
-    finished trajectories are returned, and the others have the status ``INTERRUPTED``.
+    and its events depend neither on the others nor on their order or the number of threads; they agree with
+    those of `integrate` up to rounding, or up to the tolerance with adaptive steps. Ctrl-C ends the
+    integration: finished trajectories are returned, and the others have the status ``INTERRUPTED``.
 
     Parameters
     ----------
@@ -104,8 +104,12 @@ def integrate_many(
         True: show a progress bar on a terminal. A function: it is called repeatedly, in this thread, with an
         `integrators.Progress`: the fraction of finished trajectories, and their steps.
     events : Event or callable, or a sequence of them, optional
-        Events, as in `integrate`. Trajectories are then integrated one after another, or one in each thread.
-        A terminal event ends its trajectory; states at later times are NaN.
+        Events, as in `integrate`. A terminal event ends its trajectory; states at later times are NaN. With
+        adaptive steps of HBVM and Gauss, trajectories with events are integrated in SIMD lanes too, also
+        where events end them or change the state. A trajectory leaves its lane and is integrated by itself
+        where more than 128 events happen in a step, where the search or an action fails, or where an action
+        changes a parameter that velocities depend on. With a fixed step size trajectories with events are
+        integrated one after another, or one in each thread.
     backend : {"jax"}, optional
         Integrate on JAX's default device, such as a GPU: HBVM and Gauss with a fixed step. Needs diffrax.
     sample : {"partial", "steps", "stop", "dense"}, optional
@@ -207,8 +211,7 @@ def integrate_many(
         if start is None:
             vectors = along(numbers)
             return integrate_with(program, *given(numbers), problem.t0, threads, sample, vectors), None
-        members = follow(start, *given(numbers), problem.t0, threads)
-        return joined([item for item, _ in members], grid), [happened for _, happened in members]
+        return find_with(start, *given(numbers), problem.t0, threads)
 
     if executor is not None:
         pieces = [
@@ -220,7 +223,10 @@ def integrate_many(
         )
         pieces_ = Remote(executor, problem, method, task, *more).run(pieces)
     else:
-        batches = start is None and in_batches(program, grid, sample, directions)
+        if start is None:
+            batches = in_batches(program, grid, sample, directions)
+        else:
+            batches = finds_in_batches(start, grid)
         few = program.piece if offers(program, PieceSize) else FIRST * threads
         soon = SOON if progress or checkpoint is not None else UNWATCHED
         pieces_ = _local(here, gathered, few if batches else threads, size, soon)

@@ -21,6 +21,7 @@ from integrators.protocol import (
     Array,
     Batches,
     BatchesAlong,
+    BatchesEvents,
     Destination,
     Interruptible,
     MethodBase,
@@ -202,6 +203,21 @@ def integrate_with(
     return program.batch(starts, par, times=times, t0=t0, **options)
 
 
+def finds_in_batches(start: Any, times: Array) -> bool:
+    """Whether what `started_with_events` returned finds the events of such trajectories together."""
+    return times.ndim == 1 and offers(start, BatchesEvents) and start.goes_in_batches()
+
+
+def find_with(
+    start: Any, starts: Array, par: Array, times: Array, t0: float, threads: int
+) -> tuple[Trajectories, list[dict[str, Occurrences]]]:
+    """Integrate some trajectories and look for their events: in lanes where that can be, or one by one."""
+    if finds_in_batches(start, times):
+        return start.find_in_batch(starts, par, times, t0, threads)
+    members = follow(start, starts, par, times, t0, threads)
+    return joined([item for item, _ in members], times), [happened for _, happened in members]
+
+
 def integrate_piece(problem: Problem, method: MethodBase, *piece: Any) -> Trajectories:
     """Integrate some trajectories in a worker: `integrate_with` its own program."""
     return integrate_with(prepared(method, problem.system)[0], *piece)
@@ -226,8 +242,7 @@ def find_in_piece(
     problem: Problem, method: MethodBase, search: Search, *piece: Any
 ) -> tuple[Trajectories, list[dict[str, Occurrences]]]:
     """Integrate some trajectories in a worker and look for their events: starts, par, times, t0, threads."""
-    members = follow(search.start, *piece)
-    return joined([item for item, _ in members], piece[2]), [happened for _, happened in members]
+    return find_with(search.start, *piece)
 
 
 class Gathered:

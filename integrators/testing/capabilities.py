@@ -15,6 +15,7 @@ from integrators.protocol import (
     AsHBVM,
     Batches,
     BatchesAlong,
+    BatchesEvents,
     Checkpoints,
     Destination,
     DoubleDouble,
@@ -312,6 +313,29 @@ def batches_along_are_single_trajectories(method: MethodBase, problem: Problem) 
     return None
 
 
+def batches_find_the_events_of_single_trajectories(method: MethodBase, problem: Problem) -> str | None:
+    """Check that a batch finds the events that its trajectories have alone, and ends where they end."""
+    program: Any = method.compile(problem.system)
+    if not offers(program, Events):
+        return "it finds no events"
+    grid = irregular(problem)
+    plain = integrate(problem, method, grid).y[:, 0]
+    level = float(plain.min() + plain.max()) / 2.0
+    event = Event(lambda y: y[0] - level, terminal=2, name="level")
+    begin = program.with_events(problem, {"level": event})
+    if not (offers(begin, BatchesEvents) and begin.goes_in_batches()):
+        return "it finds no events in batches"
+    starts, par = np.outer([1.0, 1.001, 0.999], problem.y0), np.tile(problem.par, (3, 1))
+    batch, happened = begin.find_in_batch(starts, par, grid, problem.t0, 1)
+    for y0, status, stop, events in zip(starts, batch.status, batch.t_stop, happened, strict=True):
+        alone = integrate(problem.replace(y0=y0), method, grid, events=event)
+        require(status is alone.status, f"a trajectory ends as alone, {alone.status}, but: {status}")
+        moments = np.append(events["level"].t, stop) - np.append(alone.events["level"].t, alone.t_stop)
+        apart = float(np.max(np.abs(moments)))
+        require(apart < BATCH_BOUND, f"its events happen when they do alone, but for {apart:.1e}")
+    return None
+
+
 def prepared_batches_are_batches(method: MethodBase, problem: Problem) -> str | None:
     """Check that a prepared batch is bitwise identical to one that was not prepared."""
     program: Any = method.compile(problem.system)
@@ -389,6 +413,7 @@ CHECK_OF: dict[type, Callable[[MethodBase, Problem], str | None]] = {
     EventStepper: finds_events_beside_its_steps,
     Batches: batches_are_single_trajectories,
     BatchesAlong: batches_along_are_single_trajectories,
+    BatchesEvents: batches_find_the_events_of_single_trajectories,
     PreparedBatches: prepared_batches_are_batches,
     Threads: threads_change_no_bits,
     PieceSize: the_size_of_a_piece_is_a_count,

@@ -18,13 +18,14 @@ METHODS = [
     Gauss(s=8, h=0.3),
 ]
 
-# With a fixed step there are no pieces, and no events that change the state.
+# With a fixed step there are no pieces, no batches with events, and no events that change the state.
 NEED_NOT_APPLY = (
     testing.failure_is_a_status,
     testing.the_size_of_a_piece_is_a_count,
     testing.events_may_change_the_state,
     testing.pairs_hold_twice_the_digits,
     testing.batches_along_are_single_trajectories,  # of more than 16 stages
+    testing.batches_find_the_events_of_single_trajectories,
 )
 
 

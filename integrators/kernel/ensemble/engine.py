@@ -24,6 +24,6 @@ def _run_own() -> Any:
 
 
 run_own = Engine(
-    _run_own, "group budget", *SOURCES, "parts", "context", "tables", "step", "../running/watchdog"
+    _run_own, "group budget", *SOURCES, "parts", "context", "tables", "step", "events", "../running/watchdog"
 )
 """``run_own(group, budget)``: see `integrators.kernel.ensemble.own`."""

@@ -6,6 +6,10 @@ number of rows first; `lanes` is the length of a row.
 
 from integrators.kernel.native.memory import Array, Integer, Memory, Real
 
+# How a trajectory has left its lane: to go by itself from its start, at its last time, where events
+# accumulate, or, from BY_EVENT on, ended by the first event, the second, ...
+LEFT, ARRIVED, ACCUMULATES, BY_EVENT = range(4)
+
 
 class Group(Memory):
     """As many trajectories as a vector has lanes, their present step, and what is to be done with them."""
@@ -104,7 +108,7 @@ class Group(Memory):
     part_extrapolation = Array()  # (k, k): `extrapolation`,
     part_reach = Array()  # and `reach`
     out = Array()  # (n, samples, dim)
-    arrived = Array(kind=int)  # (n): 1, or 0 for one that left
+    arrived = Array(kind=int)  # (n): LEFT, ARRIVED, ...
     all_sweeps = Array(kind=int)  # (n)
     trajectories = Integer()  # n
     at = Integer()  # first trajectory of the group,
@@ -121,3 +125,29 @@ class Group(Memory):
     before = Array("lanes")  # its sweeps before the present step
     mark = Array("lanes")  # the time at which it was last seen to get anywhere
     all_steps = Array(kind=int)  # (n)
+
+    # --- events in the steps of these; see `ensemble.watch` ---
+    events = Integer()  # how many; 0: nobody looks
+    search = Integer()  # address of a `Search`, which looks into one lane after another
+    partials = Array(kind=int)  # (lanes): address of a `Context` for partial steps of each lane
+    renews = Integer()  # 1: other parameters change no velocities, and actions may set them in lanes
+    function_values = Array("events", "lanes")  # of each lane, one after another: `Search.ends`,
+    function_zeros = Array("events", "lanes")  # `Search.touched`,
+    function_finite = Array("events", "lanes", kind=int)  # `Search.finite`,
+    happened = Array("events", "lanes", kind=int)  # and `Search.happened`
+    # The start of a step of all lanes, where most lanes have taken it when it is looked at.
+    start_t0 = Array("lanes")
+    start_time_low = Array("lanes")
+    start_state = Array("dim", "lanes")
+    start_error = Array("dim", "lanes")
+    stops = Array()  # (n): when an event has ended a trajectory
+    # What has happened, of all trajectories as it was found; arrays that the owner empties.
+    log_room = Integer()
+    logged = Integer()
+    log_members = Array(kind=int)
+    log_times = Array()
+    log_states = Array()
+    log_after = Array()
+    log_par = Array()
+    log_events = Array(kind=int)
+    log_directions = Array(kind=int)

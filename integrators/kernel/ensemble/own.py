@@ -4,13 +4,16 @@ Steps are done on all lanes at once by the code of `integrators.kernel.ensemble.
 are judged and followed there too (`integrators.kernel.ensemble.control`). Elsewhere, whether a step is
 good enough and how long the next one is follows as it does for a single trajectory
 (`integrators.kernel.step.vary`): each lane has a `Context` of its own, which catches up then. A step does
-not pass the time of the next sample, but ends there.
+not pass the time of the next sample, but ends there. Events are looked for in
+every step (`integrators.kernel.ensemble.watch`).
 """
 
 from math import log
 
-from integrators.kernel.context import DIVERGED, DONE, Context
-from integrators.kernel.ensemble.group import Group
+from integrators.kernel.context import DIVERGED, DONE
+from integrators.kernel.ensemble.group import LEFT, Group
+from integrators.kernel.ensemble.lane import clear, context_at, fetch, place, unload, write
+from integrators.kernel.ensemble.watch import has_room, keep_start, look_at_start, watch, watch_ordinary
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.parts.implicit import FIXED_POINT
@@ -19,7 +22,7 @@ from integrators.kernel.simd.memory import call_steps, put, splat8
 from integrators.kernel.step.anew import reset
 from integrators.kernel.step.begin import INFINITY, is_within_reach
 from integrators.kernel.step.control import defect_power, error_power, is_distinct
-from integrators.kernel.step.kinks import arrived, end_behind, is_near_one
+from integrators.kernel.step.kinks import end_behind, is_near_one
 from integrators.kernel.step.rule import FIRST_RATE, SMALLEST
 from integrators.kernel.step.size import speed_of
 from integrators.kernel.step.vary import (
@@ -29,7 +32,6 @@ from integrators.kernel.step.vary import (
     accepts,
     begin_attempts,
     log_worth,
-    remaining,
     take,
     within,
 )
@@ -37,24 +39,7 @@ from integrators.running import watchdog
 from integrators.running.watchdog import CRAWL_STEPS
 
 group_at = view(Group)
-context_at = view(Context)
 collapsed = compiled(watchdog.collapsed)
-
-
-@compiled
-def place(ctx, d):
-    """Return where component d of (q, p), or of y, is in a state of a `Context`."""
-    if ctx.second == 0:
-        return d
-    rows = ctx.rows
-    return 8 * (d // 4) + 4 + d % 4 if d < rows else 8 * ((d - rows) // 4) + (d - rows) % 4
-
-
-@compiled
-def clear(group, lane):
-    """Forget the lane's values of the field, and their polynomial."""
-    for i in range(group.k * group.rows):
-        group.values[group.lanes * i + lane] = group.ahead[group.lanes * i + lane] = 0.0
 
 
 @compiled
@@ -90,34 +75,10 @@ def load(group, lane):
     group.sweeps[lane], group.rate[lane] = 0.0, FIRST_RATE
     group.mark[lane] = group.start_time
     group.samples_written[lane] = 0
-    write(group, lane, ctx)
-
-
-@compiled
-def unload(group, lane, arrived):
-    """Take the trajectory from a lane."""
-    i = group.member[lane]
-    group.arrived[i] = arrived
-    group.all_sweeps[i] = int(group.sweeps[lane])
-    group.all_steps[i] = context_at(group.contexts[lane]).counters.steps
-    group.member[lane] = -1
-
-
-@compiled
-def write(group, lane, ctx):
-    """Write the samples that are at the present time; after the last one the trajectory is at its end."""
-    i, dim, count = group.member[lane], group.dim, group.samples_written[lane]
-    while count < group.count:
-        ctx.controller.stop = group.times[count]
-        if remaining(ctx, ctx.controller.stop) != 0.0:
-            break
-        out = group.out + dim * (group.count * i + count)
-        for d in range(dim):
-            out[d] = group.state[group.lanes * d + lane]
-        count += 1
-    group.samples_written[lane] = count
-    if count == group.count:
-        unload(group, lane, 1 if arrived(ctx) else 0)
+    if group.events and not look_at_start(group, lane, ctx):
+        unload(group, lane, LEFT)
+    else:
+        write(group, lane, ctx)
 
 
 @compiled
@@ -161,7 +122,7 @@ def enter(group, lane):
         elif aim(group, lane):
             return 1
         else:
-            unload(group, lane, 0)
+            unload(group, lane, LEFT)
 
 
 @compiled
@@ -187,26 +148,23 @@ def catch_up(group, lane, ctx):
 @compiled
 def settle(group, lane):
     """Take the step that was tried in a lane, if it is good enough."""
-    lanes, dim, rows, k = group.lanes, group.dim, group.rows, group.k
     ctx = context_at(group.contexts[lane])
     if group.since[lane] > 0.0:
         catch_up(group, lane, ctx)
     ctx.h = group.h[lane]
     outcome = DONE if group.alive[lane] == 1.0 else DIVERGED
     if outcome == DONE:
-        for d in range(dim):
-            ctx.next_state[place(ctx, d)] = group.next_state[lanes * d + lane]
-            ctx.next_error[place(ctx, d)] = group.next_error[lanes * d + lane]
-        for d in range(rows):
-            ctx.scratch.row_state[d] = group.state[lanes * d + lane]
-            for i in range(k):
-                ctx.values[ctx.lanes * d + i] = group.values[lanes * (rows * i + d) + lane]
+        fetch(group, lane, ctx)
+        for d in range(group.rows):
+            ctx.scratch.row_state[d] = group.state[group.lanes * d + lane]
     else:
         clear(group, lane)
     if accepts(ctx, outcome, int(group.sweeps[lane] - group.before[lane]), 0):
-        step(group, lane, ctx)
+        if group.events == 0 or watch(group, lane, ctx):
+            step(group, lane, ctx)
+        leave_if_slow(group, lane, ctx)
     elif ctx.kinks.count or ctx.controller.attempts >= FUTILE:
-        unload(group, lane, 0)
+        unload(group, lane, LEFT)
 
 
 @compiled
@@ -227,10 +185,15 @@ def step(group, lane, ctx):
         group.ends[group.lanes * d + lane] = end_behind(ctx, d)
         group.lasts[group.lanes * d + lane] = ctx.kinks.lasts_behind[d]
     write(group, lane, ctx)
+
+
+@compiled
+def leave_if_slow(group, lane, ctx):
+    """Let a trajectory leave its lane where it needs another solver, vanishes, or does not get anywhere."""
     if group.member[lane] >= 0 and (
         ctx.implicit.slow >= HELD_BACK_STEPS or vanishes(ctx) or crawls(group, lane, ctx)
     ):
-        unload(group, lane, 0)
+        unload(group, lane, LEFT)
 
 
 @compiled
@@ -277,7 +240,7 @@ def run(first, budget):
     """Integrate the trajectories from ``at`` to ``end``; return 1 at their end, or 0 after ``budget`` steps.
 
     Where `Group.more` is set it returns as soon as a lane is without a trajectory: the others go on in the
-    next call, beside those that follow.
+    next call, beside those that follow. It also returns where events have filled their room.
 
     Parameters
     ----------
@@ -300,11 +263,17 @@ def run(first, budget):
             running += 1 if group.ordinary[lane] == 1.0 else enter(group, lane)
         if running == 0 or (group.more and running < lanes):
             return 1
-        if budget <= 0:
+        if budget <= 0 or not (group.events == 0 or has_room(group)):
             return 0
         budget -= 1
         group.n = 0
+        if group.events:
+            keep_start(group)
         call_steps(group.code, group, 1)
         for lane in range(lanes):
-            if group.member[lane] >= 0 and group.ordinary[lane] == 0.0:
+            if group.member[lane] < 0:
+                continue
+            if group.ordinary[lane] == 0.0:
                 settle(group, lane)
+            elif group.events and not watch_ordinary(group, lane):
+                leave_if_slow(group, lane, context_at(group.contexts[lane]))

@@ -142,7 +142,7 @@ class Lanes:
         """
         shape = {
             "code": self._code.address, "lanes": self.width, "rows": self.rows, "dim": self.dim,
-            "parameters": self.parameters, "k": self.k, **numbers,
+            "parameters": self.parameters, "k": self.k, "events": 0, **numbers,
         }  # fmt: skip
         matrix = self._matrix(h)
         group, side = (Group(shape, {**self._fixed, **arrays, "matrix": matrix}) for _ in range(2))

@@ -57,6 +57,56 @@ def _tables() -> tuple[Array, list[Array], NDArray[np.int64]]:
     return cosines, tables, np.array([table.ctypes.data for table in tables])
 
 
+def search_memory(
+    events: Mapping[str, Event], functions: Sequence[EventFunction], actions: Mapping[str, Action],
+    contexts: tuple[Context, Context], steps: int, end: float, sign: float,
+) -> Search:  # fmt: skip
+    """Return the memory of a search, without room for what it finds.
+
+    Parameters
+    ----------
+    events, functions, actions, contexts, steps, end
+        As of `KernelSearch`.
+    sign : {1.0, -1.0}
+        The direction of time.
+    """
+    own, partial = contexts
+    dim, n_par = own.shape.dim, own.par.size
+    degree = 1 << (min(max(2 * own.s, LEAST), MOST) - 1).bit_length()
+    numbers = {
+        "count": len(events), "dim": dim, "degree": degree, "chunks": degree // 8, "terms": own.s,
+        "steps": steps, "own": own.address, "partial": partial.address,
+        "parameters": n_par, "made_rows": 1 + dim + n_par, "last": end, "sign": sign,
+    }  # fmt: skip
+    cosines, _, transforms = _tables()
+    memory = Search(numbers, {"cosines": cosines, "transforms": transforms})
+    memory.asked = memory.address + 8 * Search.part.place
+    memory.functions[:] = [function.address for function in functions]
+    memory.directions[:] = [event.direction for event in events.values()]
+    memory.limits[:] = [event.last for event in events.values()]
+    memory.actions[:] = [actions[name].address if name in actions else 0 for name in events]
+    return memory
+
+
+def room_for(numbers: int) -> int:
+    """Return how many occurrences of so many numbers are kept until Python asks, to begin with."""
+    return max(8, min(HITS, NUMBERS // numbers))
+
+
+def give_room(memory: Search, room: int) -> tuple[NDArray[Any], ...]:
+    """Give a search room for so many occurrences; return it as `EventLog.take` has it."""
+    times, states, after = np.empty(room), *np.empty((2, room, memory.dim))
+    (events, directions), par = np.empty((2, room), dtype=np.int64), np.empty((room, memory.parameters))
+    memory.point(
+        {
+            "hit_times": times, "hit_states": states, "hit_after": after, "hit_par": par,
+            "hit_events": events, "hit_directions": directions,
+        }
+    )  # fmt: skip
+    memory.room = room
+    return times, states, after, events, directions, par
+
+
 class KernelSearch:
     """Looks for events in the steps of a trajectory; satisfies `integrators.events.finder.Finder`.
 
@@ -86,24 +136,11 @@ class KernelSearch:
         contexts: tuple[Context, Context], steps: int, end: float,
     ):  # fmt: skip
         self._functions, self._actions = functions, actions
-        self._context, partial = contexts
-        self._dim, n_par, n = self._context.shape.dim, self._context.par.size, len(events)
-        degree = 1 << (min(max(2 * self._context.s, LEAST), MOST) - 1).bit_length()
-        numbers = {
-            "count": n, "dim": self._dim, "degree": degree, "chunks": degree // 8, "terms": self._context.s,
-            "steps": steps, "own": self._context.address, "partial": partial.address,
-            "parameters": n_par, "made_rows": 1 + self._dim + n_par, "last": end,
-            "sign": 1.0 if end >= self._context.t0 else -1.0,
-        }  # fmt: skip
-        cosines, self._tables, transforms = _tables()
-        self._memory = memory = Search(numbers, {"cosines": cosines, "transforms": transforms})
-        memory.asked = memory.address + 8 * Search.part.place
-        memory.functions[:] = [function.address for function in functions]
-        memory.directions[:] = [event.direction for event in events.values()]
-        memory.limits[:] = [event.last for event in events.values()]
-        memory.actions[:] = [actions[name].address if name in actions else 0 for name in events]
+        self._context, _ = contexts
+        self._dim, sign = self._context.shape.dim, 1.0 if end >= self._context.t0 else -1.0
+        self._memory = memory = search_memory(events, functions, actions, contexts, steps, end, sign)
         self._hits = EventLog(events, memory.sign, self._dim, memory.parameters)
-        self._make_room(self._first_room)
+        self._make_room(room_for(max(self._dim, memory.parameters)))
         self.trouble: tuple[Status, str, Exception | None] | None = None
         if self._look(START) != DONE:
             error = self._error
@@ -112,21 +149,8 @@ class KernelSearch:
         self._context.events.code = look.code().address
         self._context.events.act, self._context.events.acted = int(bool(actions)), -memory.sign * np.inf
 
-    @property
-    def _first_room(self) -> int:
-        return max(8, min(HITS, NUMBERS // max(self._dim, self._memory.parameters)))
-
     def _make_room(self, room: int) -> None:
-        self._times, self._states, self._after = np.empty(room), *np.empty((2, room, self._dim))
-        self._par = np.empty((room, self._memory.parameters))
-        self._events, self._directions = np.empty((2, room), dtype=np.int64)
-        self._memory.point(
-            {
-                "hit_times": self._times, "hit_states": self._states, "hit_after": self._after,
-                "hit_par": self._par, "hit_events": self._events, "hit_directions": self._directions,
-            }
-        )  # fmt: skip
-        self._memory.room = room
+        self._found = give_room(self._memory, room)
 
     def _look(self, mode: int) -> int:
         self._memory.mode = mode
@@ -189,10 +213,7 @@ class KernelSearch:
     def hits(self) -> EventLog:
         """What has happened."""
         n, self._memory.hits = self._memory.hits, 0
-        self._hits.take(
-            self._times[:n], self._states[:n], self._after[:n], self._events[:n], self._directions[:n],
-            self._par[:n],
-        )  # fmt: skip
+        self._hits.take(*(array[:n] for array in self._found))
         return self._hits
 
     def resume(self, counts: Sequence[int], directions: Sequence[int]) -> None:

@@ -17,8 +17,8 @@ context = view(Context)
 
 
 @intrinsic
-def call_part(typing, steps, operation, own, partial, part, out):
-    """Call the compiled steps for a partial step; see `integrators.kernel.step.entry`."""
+def call_entry(typing, steps, operation, own, partial, part, out):
+    """Call the compiled steps; see `integrators.kernel.step.entry`."""
 
     def generate(context, builder, sig, args):
         function, operation, own, partial, part, out = args
@@ -56,7 +56,7 @@ def state_at(ctx, search, t):
     search.cache_times[i] = t
     search.part = part_at(search, t)
     partial = context(search.partial)
-    outcome = call_part(search.steps, PART, search.own, search.partial, search.asked, state)
+    outcome = call_entry(search.steps, PART, search.own, search.partial, search.asked, state)
     # A partial step that only the implicit solver would solve is none: steps do not change.
     ctx.implicit.wanted = 0
     search.iterations += partial.counters.iterations

@@ -14,7 +14,7 @@ from integrators.kernel.step.begin import begin
 from integrators.kernel.step.control import is_distinct
 from integrators.kernel.step.finish import commit, finish
 from integrators.kernel.step.iterate import settle
-from integrators.kernel.step.vary import attempt
+from integrators.kernel.step.vary import attempt, take
 
 ONWARD = 1.25  # times that are probably enough to see the next one
 
@@ -25,12 +25,21 @@ def end_at_action(ctx):
 
     One that is at its start happens there at once, and the step is to be solved again from the new state.
     """
-    events, controller = ctx.events, ctx.controller
+    events = ctx.events
     outcome = call_look(events.code, ctx, events.memory)
     if outcome == DONE:
         events.seen = 1
-    if outcome != ACTS:
-        return outcome
+    if outcome == ACTS:
+        outcome = solve_to_action(ctx)
+        if outcome == DONE and ctx.solved == UNSOLVED:
+            outcome = act(ctx)
+    return outcome
+
+
+@compiled
+def solve_to_action(ctx):
+    """Solve the step ahead anew to the event in it that ends it, unless that is at its start; the outcome."""
+    events, controller = ctx.events, ctx.controller
     if not is_distinct(events.time - events.acted, events.time):
         return ACCUMULATE
     events.length_before = ctx.h if abs(ctx.h) > abs(controller.length_after) else controller.length_after
@@ -38,8 +47,8 @@ def end_at_action(ctx):
     if not is_distinct(part, ctx.t0):
         if ctx.implicit.active:
             ctx.counters.implicit_steps -= 1  # it is not taken
-        events.acting = CHANGE
-        return act(ctx)
+        ctx.solved, events.acting = UNSOLVED, CHANGE
+        return DONE
     if part != ctx.h:
         ctx.length, controller.rejected = ctx.h, 1
         ctx.solved = UNSOLVED
@@ -64,6 +73,17 @@ def insist(ctx):
     begin(ctx)
     outcome = settle(ctx)
     return finish(ctx) if outcome == DONE else outcome
+
+
+@compiled
+def end_and_change(ctx):
+    """Take the solved step up to the event in it that ends it, and let that change the state; the outcome."""
+    outcome = solve_to_action(ctx)
+    if outcome != DONE:
+        return outcome
+    if ctx.solved != UNSOLVED:  # the event is not at the start of the step
+        take(ctx)
+    return change(ctx)
 
 
 @compiled

@@ -1,10 +1,10 @@
 """What Python calls: the one C function of the steps."""
 
 from integrators.kernel.context import DONE
-from integrators.kernel.native.engine import ADVANCE, GO_ON, PART, RESET
+from integrators.kernel.native.engine import ACT, ADVANCE, GO_ON, PART, RESET
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.views import doubles, integers
-from integrators.kernel.step.act import go_on
+from integrators.kernel.step.act import end_and_change, go_on
 from integrators.kernel.step.anew import reset
 from integrators.kernel.step.loop import advance, context, take_steps
 from integrators.kernel.step.sample import part_step, write
@@ -17,8 +17,9 @@ def entry(operation, ctx, partial, between, count, times, targets, parts, first,
     RESET: put the trajectory at the state at ``out``. ADVANCE: see `loop.advance`.
     TAKE: take up to ``budget`` steps, none beyond times[0], which are then in ``times``.
     PART: write the state parts[0] beyond the present one to ``out``, and count nothing; parts[1] is
-    the length of the last one from there, or 0. GO_ON: begin at the state that an event has made, with the
-    parameters that are now in memory.
+    the length of the last one from there, or 0. ACT: take the solved step up to an event in it that changes
+    the state, and change that. GO_ON: begin at the state that an event has made, with the parameters that are
+    now in memory.
     """
     t, n, p, y = doubles(times), integers(targets), doubles(parts), doubles(out)
     if operation == RESET:
@@ -31,6 +32,8 @@ def entry(operation, ctx, partial, between, count, times, targets, parts, first,
         if outcome == DONE:
             write(context(partial), context(partial).next_state, y)
         return outcome
+    if operation == ACT:
+        return end_and_change(context(ctx))
     if operation == GO_ON:
         return go_on(context(ctx))
     return take_steps(context(ctx), t, y, budget)

@@ -227,15 +227,18 @@ def test_pieces_of_a_trajectory_have_the_bits_of_the_whole(method):
 
 
 @BOTH
-def test_trajectories_of_an_ensemble_bounce_one_by_one(method, tmp_path):
+def test_trajectories_of_an_ensemble_bounce_as_each_does_alone(method, tmp_path):
     starts = np.stack([np.linspace(0.5, 2.0, 7), np.zeros(7)], axis=1)
     problem = Problem(BALL, y0=[1.0, 0.0], t_end=END)
     many = integrate_many(problem, method, starts=starts, times=[7.0, END], events=bouncing(0.95), threads=2)
     for i, y0 in enumerate(starts):
         alone = integrate(Problem(BALL, y0=y0, t_end=END), method, [7.0, END], events=bouncing(0.95))
-        assert np.array_equal(many.y[i], alone.y)
-        assert np.array_equal(many.errors()["energy"][i], alone.errors()["energy"])
-        assert np.array_equal(many.events[i]["bounce"].after, alone.events["bounce"].after)
+        together, bounces = many.events[i]["bounce"], alone.events["bounce"]
+        close = 0.0 if method.h else 2e-13  # one by one with a fixed step; measured in lanes 6e-14
+        assert np.abs(many.y[i] - alone.y).max() <= close
+        assert np.abs(together.t - bounces.t).max() <= close
+        assert np.abs(together.after - bounces.after).max() <= close
+        assert np.abs(many.errors()["energy"][i] - alone.errors()["energy"]).max() <= close
     assert many.warnings == [()] * 7
     many.save(tmp_path / "balls.npz")
     loaded: Any = integrators.load(tmp_path / "balls.npz")

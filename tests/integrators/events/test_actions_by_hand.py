@@ -124,8 +124,10 @@ def test_a_run_and_an_ensemble_and_checkpoints_have_the_present_parameters(metho
     many: Any = integrators.integrate_many(
         problem, method, parameters={"g": [1.0, 1.2]}, times=GRID[1:], events=event, threads=2
     )
-    assert np.array_equal(many.y[0], found.y[1:])
-    assert np.array_equal(many.errors()["energy"][0], found.errors()["energy"][1:])
+    close = 0.0 if method.h else 5e-15  # one by one with a fixed step; measured in lanes 4e-16
+    assert np.abs(many.y[0] - found.y[1:]).max() <= close
+    assert np.abs(many.events[0]["passing"].par - hits.par).max() <= close
+    assert np.abs(many.errors()["energy"][0] - found.errors()["energy"][1:]).max() <= close
     many.save(tmp_path / "many.npz")
     loaded: Any = integrators.load(tmp_path / "many.npz")
     assert np.array_equal(loaded[1].events["passing"].par, many[1].events["passing"].par)

@@ -103,13 +103,15 @@ class TestMany:
             one = Problem(henon_heiles.system, y0=start, t_end=50.0)
             alone = integrate(one, method, times, events=events)
             assert many.status[i] is alone.status
-            assert many.reason[i] == alone.reason
-            assert many.t_stop[i] == alone.t_stop
-            assert many.y[i][: alone.t.size].tobytes() == alone.y.tobytes()
+            close = 0.0 if method.h else 2e-13  # one by one with a fixed step; measured in lanes 8e-14
+            assert many.reason[i].split(" at t =")[0] == alone.reason.split(" at t =")[0]
+            assert many.reason[i].endswith(f"t = {float(many.t_stop[i])!r}.") or not alone.reason
+            assert abs(many.t_stop[i] - alone.t_stop) <= close
+            assert np.abs(many.y[i][: alone.t.size] - alone.y).max() <= close
             assert np.isnan(many.y[i][alone.t.size :]).all()
             for name, found in alone.events.items():
-                assert many.events[i][name].t.tobytes() == found.t.tobytes()
-                assert many.events[i][name].y.tobytes() == found.y.tobytes()
+                assert np.abs(many.events[i][name].t - found.t).max() <= close
+                assert np.abs(many.events[i][name].y - found.y).max() <= close
         assert Status.EVENT in many.status
 
     def test_what_a_function_raises_is_the_trajectorys_own(self, henon_heiles):

@@ -130,7 +130,8 @@ def test_what_was_searched_before_leaves_no_trace(method, then):
     starts = KEPLER.y0 * np.linspace(0.8, 1.2, 7)[:, None]
     starts[3] *= -1.0
     for end in (9.0, -9.0):
-        together = integrate_many(KEPLER, method, starts=starts, times=[end], events=events)
+        own = np.full((7, 1), end)  # times of their own: trajectories go one by one
+        together = integrate_many(KEPLER, method, starts=starts, times=own, events=events)
         for i, y0 in enumerate(starts):
             made = method.compile(KEPLER.system)  # whose memory is fresh
             kept = made.with_events(KEPLER, named(events))(y0, KEPLER.par, 0.0, end)

@@ -22,6 +22,7 @@ NEED_NOT_APPLY = (
     testing.is_the_hbvm_that_it_names,
     testing.tangents_follow_and_change_nothing,
     testing.batches_along_are_single_trajectories,
+    testing.batches_find_the_events_of_single_trajectories,
     testing.adjoints_are_what_tangents_say,
     testing.events_may_change_the_state,
     testing.pairs_hold_twice_the_digits,

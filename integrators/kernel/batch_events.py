@@ -1,0 +1,228 @@
+"""Many trajectories with events: in lanes where steps are adaptive, with what happens in each.
+
+A trajectory that leaves its lane is searched by itself, from its start.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from integrators.events.event import Event
+from integrators.events.finder import Ending, ended_by
+from integrators.events.members import ending_of
+from integrators.kernel.batch import Adaptive, Batch, BatchProgram, Work, nothing_yet
+from integrators.kernel.ensemble.group import ACCUMULATES, BY_EVENT
+from integrators.kernel.ensemble.prepared import Lanes
+from integrators.kernel.events.engine import look
+from integrators.kernel.events.functions import Action, EventFunction
+from integrators.kernel.events.search import give_room, room_for, search_memory
+from integrators.kernel.pace import FEWEST, Pace
+from integrators.kernel.step.engine import steps
+from integrators.kernel.stepper import CHUNK_WITH_EVENTS, HBVMStepper, accumulated
+from integrators.protocol import Array, Samples, Status
+from integrators.refusals import check_batch, check_times
+from integrators.solution import Occurrences
+
+HITS = 128  # of a step of a lane, at most; a trajectory with more leaves it
+
+
+class Program(BatchProgram, Protocol):
+    """What trajectories with events ask of their program."""
+
+    varying: bool
+
+    @property
+    def renews(self) -> bool: ...
+    def program_of_lanes(self) -> "Program": ...
+
+
+@dataclass(frozen=True, eq=False)
+class WithEvents:
+    """The events of the trajectories of a program: starts them one by one, or many in lanes.
+
+    Attributes
+    ----------
+    program : Program
+        Of the trajectories.
+    events : mapping of str to Event
+        What is looked for.
+    functions, actions : sequence of EventFunction, mapping of str to Action
+        What is compiled of it.
+    """
+
+    program: Program
+    events: Mapping[str, Event]
+    functions: Sequence[EventFunction]
+    actions: Mapping[str, Action]
+
+    def __call__(self, y0: ArrayLike, par: ArrayLike | None, t0: float, end: float) -> HBVMStepper:
+        """Return a stepper that looks for the events up to a time."""
+        stepper = self.program.start(y0, par, t0)
+        stepper.look_for(self.events, self.functions, self.actions, end)
+        return stepper
+
+    def raise_what_is_no_failure(self) -> None:
+        """Raise Ctrl-C and the like if they were raised in a function of the user in this thread."""
+        for function in (*self.functions, *self.actions.values()):
+            if function.error is not None and not isinstance(function.error, Exception):
+                raise function.error
+
+    def goes_in_batches(self) -> bool:
+        """Whether trajectories go in lanes; see `integrators.protocol.BatchesEvents`."""
+        return self.program.varying and self.program.program_of_lanes().in_lanes() is not None
+
+    def find_in_batch(
+        self, Y0: ArrayLike, par: ArrayLike | None, times: ArrayLike, t0: float, threads: int
+    ) -> tuple[Batch, list[dict[str, Occurrences]]]:
+        """Integrate every start to all times; return the trajectories, and what has happened in each."""
+        program = self.program.program_of_lanes()
+        lanes = program.in_lanes()
+        assert lanes is not None
+        grid = check_times(times, t0)
+        starts, parameters = check_batch(Y0, par, grid, program.system)
+        work = _Work(
+            result=nothing_yet(grid, *starts.shape), starts=starts, parameters=parameters, t0=t0,
+            sample="partial", threads=threads, program=program,
+            search=WithEvents(program, self.events, self.functions, self.actions),
+            happened=[{} for _ in starts],
+        )  # fmt: skip
+        in_lanes = _Watched.planned(lanes, work)
+        work.run(in_lanes)
+        work.tell(in_lanes)
+        return work.result, work.happened
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Work(Work):
+    """A batch whose events are looked for."""
+
+    program: Program
+    search: WithEvents
+    happened: list[dict[str, Occurrences]]
+
+    def started(self, i: int) -> HBVMStepper:
+        """Return a stepper at the start of a trajectory."""
+        return self.search(self.starts[i], self.parameters[i], self.t0, float(self.result.t[-1]))
+
+    def ending(self, i: int, stepper: HBVMStepper, samples: Samples) -> tuple[Ending, int]:
+        """Return how a trajectory ended, and how many of the samples it reached; note what has happened."""
+        ending = ending_of(stepper, samples, self.t0, float(self.result.t[-1]))
+        search: Any = stepper.search
+        self.happened[i] = search.hits.occurrences()
+        return ending, ending.count(samples.t, search)
+
+    def tell(self, lanes: "_Watched") -> None:
+        """Say how the trajectories that stayed in lanes ended, and what has happened in them."""
+        result, names = self.result, list(self.search.events)
+        stops, arrived = lanes.arrays["stops"].tolist(), lanes.arrived
+        for i in np.flatnonzero(arrived >= ACCUMULATES).tolist():
+            result.t_stop[i] = stops[i]
+            if arrived[i] == ACCUMULATES:
+                result.status[i], result.reason[i] = accumulated(stops[i])
+            else:
+                result.status[i] = Status.EVENT
+                result.reason[i] = ended_by(names[arrived[i] - BY_EVENT], stops[i])
+        found = lanes.occurrences()
+        for i in np.flatnonzero(arrived).tolist():
+            self.happened[i] = {name: each[i] for name, each in found.items()}
+
+
+@dataclass(frozen=True, eq=False)
+class _Log:
+    """Occurrences of events in the order in which they were found: room for them, or a part of it."""
+
+    members: NDArray[np.int64]
+    times: Array
+    states: Array
+    after: Array
+    par: Array
+    events: NDArray[np.int64]
+    directions: NDArray[np.int64]
+
+    @classmethod
+    def empty(cls, room: int, dim: int, parameters: int) -> "_Log":
+        """Return room for so many."""
+        members, events, directions = (np.empty(room, np.int64) for _ in range(3))
+        states, after = (np.empty((room, dim)) for _ in range(2))
+        return cls(members, np.empty(room), states, after, np.empty((room, parameters)), events, directions)
+
+    def chosen(self, which: Any) -> "_Log":
+        """Return a copy of some."""
+        return _Log(*(array[which].copy() for array in vars(self).values()))
+
+    @classmethod
+    def joined(cls, logs: Sequence["_Log"]) -> "_Log":
+        """Return several as one."""
+        return cls(*map(np.concatenate, zip(*(vars(log).values() for log in logs), strict=True)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Watched(Adaptive):
+    """Adaptive steps that are searched for events: in each lane one trajectory after the other."""
+
+    work: _Work
+    logs: list[_Log] = field(default_factory=list)
+
+    @classmethod
+    def plan(cls, lanes: Lanes, work: Work) -> tuple[float, dict[str, int], dict[str, Any]]:
+        assert isinstance(work, _Work)
+        h, counts, arrays = super().plan(lanes, work)
+        events = {"events": len(work.search.events)}
+        return h, counts | events, arrays | {"stops": np.full(len(work.starts), np.nan)}
+
+    def memory(self) -> Any:
+        search, width, dim = self.work.search, self.lanes.width, self.lanes.dim
+        end, parameters = float(self.work.result.t[-1]), self.lanes.parameters
+        sign = 1.0 if end >= self.work.t0 else -1.0
+        group, pairs = super().memory()
+        events = search_memory(
+            search.events, search.functions, search.actions, pairs[0], steps.code().address, end, sign
+        )
+        room = min(HITS, room_for(max(dim, parameters)))
+        give_room(events, room)
+        log = _Log.empty(2 * width * room, dim, parameters)
+        group.point(
+            {f"log_{name}": array for name, array in vars(log).items()}
+            | {"partials": np.array([partial.address for _, partial in pairs])}
+        )
+        group.log_room, group.search = 2 * width * room, events.address
+        group.renews = int(self.work.program.renews)
+        for context, _ in pairs:
+            context.events.code, context.events.memory = look.code().address, events.address
+            context.events.act = int(bool(search.actions))
+        return group, pairs, events, log
+
+    def advance(self, memory: Any, budget: int) -> int:
+        group, _, _, log = memory
+        outcome = super().advance(memory, budget)
+        if group.logged:
+            self.logs.append(log.chosen(slice(group.logged)))
+            group.logged = 0
+        self.work.search.raise_what_is_no_failure()
+        return outcome
+
+    def pace(self) -> Pace:
+        pace = Pace(CHUNK_WITH_EVENTS, self.lanes.dim)
+        pace.steps = FEWEST
+        return pace
+
+    def occurrences(self) -> dict[str, list[Occurrences]]:
+        """Return what has happened in every trajectory, by the events' names, in the order of integration."""
+        events, actions = self.work.search.events, self.work.search.actions
+        n, ahead = len(self.arrived), self.work.result.t[-1] >= self.work.t0
+        log = _Log.joined([_Log.empty(0, self.lanes.dim, self.lanes.parameters), *self.logs])
+        log = log.chosen(np.lexsort((log.times if ahead else -log.times, log.members)))
+        result = {}
+        for i, name in enumerate(events):
+            own = log.chosen(log.events == i)
+            bounds = np.searchsorted(own.members, np.arange(n + 1)).tolist()
+            columns = [own.times, own.states, own.directions]
+            columns += [own.after, own.par] if name in actions else []
+            result[name] = [
+                Occurrences(*(column[start:end] for column in columns)) for start, end in pairwise(bounds)
+            ]
+        return result
