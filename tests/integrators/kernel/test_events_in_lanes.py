@@ -87,7 +87,7 @@ def stays_in_lanes(monkeypatch):
     monkeypatch.setattr(Work, "alone", alone)
 
 
-def before(found, stop):
+def before(found, stop) -> Any:
     """Return what has happened clearly before events accumulate: rounding tells how many come then."""
     chosen = np.abs(found.t - stop) > 1e-9
     changes = () if found.after is None else (found.after[chosen], found.par[chosen])
@@ -124,7 +124,7 @@ def distances(many, starts, problem, method, times, events):
             assert (found.after is None) == (expected.after is None)
             if found.after is not None:
                 states = max(states, apart(found.after, expected.after, scale))
-                assert np.abs(found.par - expected.par).max(initial=0.0) < 1e-13
+                assert np.allclose(found.par, expected.par, rtol=0, atol=1e-13)  # measured 0
     return states, moments
 
 
