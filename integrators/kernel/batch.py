@@ -291,16 +291,20 @@ class Adaptive(_InLanes):
     def plan(cls, lanes: Lanes, work: Work) -> tuple[float, dict[str, int], dict[str, Any]]:
         return 1.0, {}, {"all_steps": np.zeros(len(work.starts), np.int64)}
 
+    def contexts(self) -> list[tuple[Context, ...]]:
+        """Return fresh contexts for each lane: that of its trajectory first."""
+        return [self.work.program.contexts()[:1] for _ in range(self.lanes.width)]
+
     def memory(self) -> Any:
-        pairs = [self.work.program.contexts() for _ in range(self.lanes.width)]
-        for context, _ in pairs:
+        contexts = self.contexts()
+        for context, *_ in contexts:
             context.implicit.strategy = self.work.program.solver.strategy
             context.controller.interval = float(abs(self.work.result.t[-1] - self.work.t0))
             self.work.program.limit(context, context.controller.interval)
         group, _ = self.lanes.groups(self.work.t0, self.h, self.numbers, self.arrays)
-        group.point({"contexts": np.array([context.address for context, _ in pairs])})
+        group.point({"contexts": np.array([context.address for context, *_ in contexts])})
         group.first_length = self.work.program.first or 0.0
-        return group, pairs
+        return group, contexts
 
     def advance(self, memory: Any, budget: int) -> int:
         return run_own(memory[0].address, budget)

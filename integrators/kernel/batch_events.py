@@ -15,6 +15,7 @@ from integrators.events.event import Event
 from integrators.events.finder import Ending, ended_by
 from integrators.events.members import ending_of
 from integrators.kernel.batch import Adaptive, Batch, BatchProgram, Work, nothing_yet
+from integrators.kernel.context import Context
 from integrators.kernel.ensemble.group import ACCUMULATES, BY_EVENT
 from integrators.kernel.ensemble.prepared import Lanes
 from integrators.kernel.events.engine import look
@@ -173,6 +174,9 @@ class _Watched(Adaptive):
         h, counts, arrays = super().plan(lanes, work)
         events = {"events": len(work.search.events)}
         return h, counts | events, arrays | {"stops": np.full(len(work.starts), np.nan)}
+
+    def contexts(self) -> list[tuple[Context, ...]]:
+        return [self.work.program.contexts() for _ in range(self.lanes.width)]
 
     def memory(self) -> Any:
         search, width, dim = self.work.search, self.lanes.width, self.lanes.dim
