@@ -377,7 +377,7 @@ def bodies_of(
     Raises
     ------
     problems.errors.InputError
-        For a problem without bodies in space, and a state of another shape.
+        For a problem without bodies in space, and for what is no state of it.
 
     Examples
     --------
@@ -392,9 +392,12 @@ def bodies_of(
     n, masses = system.dim // 6, np.atleast_1d(np.array(values.get("m", []), dtype=np.float64))
     if system.dim % 6 or not 0 < masses.size <= n or (system.dof is not None and masses.size != n):
         raise InputError(f"{problem!s} has no bodies in space; make it with problems.nbody.")
-    state = problem.y0 if y is None else np.array(y, dtype=np.float64)
-    if state.shape != (system.dim,):
-        raise InputError(f"y={shown(y)} must be a state of {system.name}, {system.dim} numbers.")
+    try:
+        state = problem.y0 if y is None else np.array(y, dtype=np.float64)
+    except (TypeError, ValueError):
+        state = np.empty(0)
+    if state.shape != (system.dim,) or not np.isfinite(state).all():
+        raise InputError(f"y={shown(y)} must be a state of {system.name}, {system.dim} numbers, all finite.")
     half, v = 3 * n, state[3 * n :]
     if system.dof is not None:
         v = emit.numpy(system, "field")(problem.t0 if t is None else t, state, problem.par)[:half]

@@ -51,7 +51,7 @@ def contacts(radii: ArrayLike, massless: Annotated[int, at_least(0)] = 0) -> lis
     radii : array_like, shape (n,)
         Radii of the bodies, >= 0. Two that are 0 never touch.
     massless : int
-        Number of massless bodies, the last ones, which do not touch each other.
+        Number of massless bodies, the last ones, which do not touch each other; less than n.
 
     Returns
     -------
@@ -60,7 +60,7 @@ def contacts(radii: ArrayLike, massless: Annotated[int, at_least(0)] = 0) -> lis
     Raises
     ------
     problems.errors.InputError
-        For radii that are negative or not finite.
+        For radii that are negative or not finite, and where no body has a mass.
 
     Examples
     --------
@@ -76,6 +76,8 @@ def contacts(radii: ArrayLike, massless: Annotated[int, at_least(0)] = 0) -> lis
     """
     sizes = _radii(radii)
     n = sizes.size
+    if massless >= n:
+        raise InputError(f"massless={massless} of contacts must be less than the number of radii, {n}.")
     return [
         _contact(i, j, float(sizes[i] + sizes[j]))
         for i, j in combinations(range(n), 2)

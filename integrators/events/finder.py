@@ -169,8 +169,8 @@ class Finder(Protocol):
         """Go on from where `save` was called."""
         ...
 
-    def resume(self, counts: Sequence[int], directions: Sequence[int]) -> None:
-        """Go on at the start as after a turn: events have happened, and those that are at the start do again.
+    def resume(self, counts: Sequence[int], directions: Sequence[int], *, again: bool) -> None:
+        """Go on at the start where events have happened before, also at this very time.
 
         Parameters
         ----------
@@ -178,6 +178,8 @@ class Finder(Protocol):
             How often each event has happened.
         directions : sequence of int
             How its function has just changed its sign at the start; 0: it has not, or has only touched zero.
+        again : bool
+            Whether these, at the start, happen again, as on the way back.
         """
         ...
 

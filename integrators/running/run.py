@@ -99,6 +99,7 @@ class Run:
         self._acts = any(event.then is not None for event in self._wanted.values())
         self._before: list[Mapping[str, Occurrences]] = []
         self._since = 0  # terminal events count what happens from here on in that list
+        self._here: tuple[float, list[int]] = np.nan, []  # how events have changed their signs at that time
         self._shown: tuple[float, Array] | None = None
         self._terminates = any(event.last for event in self._wanted.values())
         self._over = False  # whether a terminal event has happened in the step ahead
@@ -130,10 +131,27 @@ class Run:
         t, self._par = self.t, par
         if self._wanted:
             self._before.append(self._happened())
-            self._since = len(self._before)
+            if not turn:
+                self._since = len(self._before)
         self._way *= -1.0 if turn else 1.0
         self._begin(y, t)
         self._shown, self._over = None, False
+        if self._wanted:
+            self._resume(t, turn)
+
+    def _resume(self, t: float, turn: bool) -> None:
+        """Let the search for events know what has happened, also at this very time."""
+        last = [self._before[-1][name] for name in self._wanted]
+        directions = [
+            int(hits.direction[-1]) if len(hits) and abs(hits.t[-1] - t) <= _rounding(t) else 0
+            for hits in last
+        ]
+        if not turn and self._here[0] == t:  # it is set once more
+            directions = [new or old for new, old in zip(directions, self._here[1], strict=True)]
+        self._here = t, directions
+        if turn or any(directions):
+            counts = [sum(len(part[name]) for part in self._before[self._since :]) for name in self._wanted]
+            self._stepper.search.resume(counts, directions, again=turn)
 
     def _turn(self) -> None:
         """Begin anew at the present, in the other direction.
@@ -141,17 +159,7 @@ class Run:
         The step ahead may contain events that have happened and others that have not. So the way back begins
         here and not at the last step. An event that has happened at this very time happens again.
         """
-        since, t = self._since, self.t
         self._anew(self.y, self._now, turn=True)
-        self._since = since
-        counts, directions = [], []
-        for name in self._wanted:
-            parts = [part[name] for part in self._before[since:]]
-            counts.append(sum(map(len, parts)))
-            last = parts[-1]
-            here = len(last) and abs(last.t[-1] - t) <= _rounding(t)
-            directions.append(int(last.direction[-1]) if here else 0)
-        self._stepper.search.resume(counts, directions)
 
     def _happened(self) -> dict[str, Occurrences]:
         """Return the events since the method began anew: up to the present, which a step may contain."""

@@ -98,10 +98,13 @@ def test_pairs_that_never_touch_have_no_function():
 def test_what_is_no_radius_or_no_body_is_refused():
     with pytest.raises(InputError, match="not negative"):
         contacts([1.0, -1.0])
+    with pytest.raises(InputError, match="massless=2 of contacts must be less than the number of radii, 2"):
+        contacts([1.0, 1.0], massless=2)
     with pytest.raises(InputError, match="1 numbers for 4 bodies"):
         merge(MASSES, POSITIONS, VELOCITIES, [1.0])
     with pytest.raises(InputError, match="positions must be finite"):
         merge(MASSES, POSITIONS[:2], VELOCITIES, RADII)
     problem = nbody(MASSES, POSITIONS, VELOCITIES, t_end=END)
-    with pytest.raises(InputError, match="a state of bodies_4, 24 numbers"):
-        bodies_of(problem, [1.0])
+    for y in ([1.0], "y", [None] * 24, [np.nan] * 24):
+        with pytest.raises(InputError, match="a state of bodies_4, 24 numbers, all finite"):
+            bodies_of(problem, y)

@@ -539,7 +539,6 @@ class Steps(Writer):
         from integrators.kernel.step.finish import added, moved_by  # imports numba
 
         b, form = self.b, self.form
-        alive = self.variable(self.bits, b.load(self.alive))
         ends = [(self.state, self.state), (self.error, self.error)]
         if form.varying:
             ahead = [self.array(Group.slots[name]) for name in ("next_state", "next_error")]
@@ -557,7 +556,8 @@ class Steps(Writer):
             return half(d, high, low, range(middle)).two_sum(half(d, high, low, range(middle, form.k)))
 
         def keep(d: Index, new: Value, lost: Value) -> None:
-            good = b.and_(b.load(alive), (new - new).compare("==", 0.0))
+            # The last sweeps are not judged: in one component of a lane they may have left no number.
+            good = b.and_(b.load(self.alive), (new - new).compare("==", 0.0))
             b.store(good, self.alive)
             for value, base, now in ((new, *ends[0]), (lost, *ends[1])):
                 self.put(value.where(good, self.get(now, d)), base, d)

@@ -7,7 +7,7 @@ again. Where the slope is nothing too, the trajectory stays there.
 """
 
 from integrators.kernel.context import ACCUMULATE, ACTS, DONE, HALTED, RENEW, VALUES
-from integrators.kernel.events.memory import GOING, RAISED, TERMINAL, TINY, UNDEFINED
+from integrators.kernel.events.memory import GOING, NOTED, RAISED, TERMINAL, TINY, UNDEFINED
 from integrators.kernel.events.sample import NAN, function, is_finite, noise_of, sign, spread_state
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.memory import call_field, call_line, put, splat8
@@ -17,7 +17,6 @@ from integrators.kernel.step.sample import read, vectors_of_state
 SIMULTANEOUS = 2.0**-49  # times whose relative difference is at most this are the same
 RESIDUE = 4.0  # times the function's value at the zero that was found, its value after may be, and is still 0
 AHEAD = 2.0**-10  # of a step
-NOTED = 2  # `Search.due` of an event without an action that has happened at the same time
 
 
 @compiled

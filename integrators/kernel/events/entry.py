@@ -5,6 +5,7 @@ from integrators.kernel.events.actions import (
     begin_anew,
     change_state,
     end_step,
+    is_zero,
     move_ahead,
     set_state_ahead,
 )
@@ -117,7 +118,10 @@ def set_end(ctx, search):
 
 @compiled
 def begin(ctx, search):
-    """Set what is known of the functions at the start: a zero there is no event, unless it is due."""
+    """Set what is known of the functions at the start: a zero there is no event, unless it is due.
+
+    One that has happened there before is no longer close to zero if the state has been set anew since.
+    """
     weigh_first(ctx, search)
     for event in range(search.count):
         search.event = event
@@ -126,8 +130,12 @@ def begin(ctx, search):
         search.ends[event] = 0.0 if abs(value) <= noise else value
         if search.due[event]:
             set_state_ahead(ctx, search)
-            ahead = function(ctx, search, search.time + move_ahead(ctx, search), search.end_state)
-            search.ends[event] = -TINY * sign(ahead - value)
+            move = move_ahead(ctx, search)
+            change = function(ctx, search, search.time + move, search.end_state) - value
+            if search.due[event] == 1:
+                search.ends[event] = -TINY * sign(change)
+            elif abs(value) <= noise or is_zero(value, change, move, search.time):
+                search.ends[event] = TINY * sign(change)
             search.due[event] = 0
         search.finite[event] = 1 if is_finite(value) else 0
         search.touched[event] = NAN

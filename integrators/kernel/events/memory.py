@@ -7,6 +7,7 @@ FINEST = 256  # samples in a step, or in a part of one, that are not exceeded
 PLACES = FINE * FINEST + 1
 ROOM = 3 * PLACES  # for marks and zeros, of which a place has three at most
 TINY = 2.0**-1000  # a sign without a size
+NOTED = 2  # `Search.due` of an event that has happened at this time, and does not again
 CACHED = 32  # states of a step that are remembered
 
 # What is looked at: the step that is solved, what of it there is up to a time, the start alone.

@@ -16,6 +16,7 @@ from integrators.kernel.events.memory import (
     FINE,
     FINEST,
     FULL,
+    NOTED,
     PART,
     RAISED,
     START,
@@ -216,10 +217,10 @@ class KernelSearch:
         self._hits.take(*(array[:n] for array in self._found))
         return self._hits
 
-    def resume(self, counts: Sequence[int], directions: Sequence[int]) -> None:
-        """Go on counting after a turn; see `integrators.events.finder.Finder`."""
+    def resume(self, counts: Sequence[int], directions: Sequence[int], *, again: bool) -> None:
+        """Go on where events have happened before; see `integrators.events.finder.Finder`."""
         self._memory.happened[:] = self._hits.counts[:] = counts
-        self._memory.due[:] = np.array(directions) != 0
+        self._memory.due[:] = (np.array(directions) != 0) * (1 if again else NOTED)
         if self._look(START) != DONE:
             raise UserError(self._error) from self._error
 

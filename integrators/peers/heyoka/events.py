@@ -97,11 +97,11 @@ class TaylorSearch:
         if self.over is None and self._counts[event] == self._events[event].last:
             self.over = t
 
-    def resume(self, counts: Sequence[int], directions: Sequence[int]) -> None:
-        """Go on counting after a turn; see `integrators.events.finder.Finder`."""
+    def resume(self, counts: Sequence[int], directions: Sequence[int], *, again: bool) -> None:
+        """Go on where events have happened before; see `integrators.events.finder.Finder`."""
         self._counts, self._hits.counts = list(counts), list(counts)
         for i, (event, direction) in enumerate(zip(self._events, directions, strict=True)):
-            if direction and event.direction in (0, -direction):
+            if again and direction and event.direction in (0, -direction):
                 self._note(self._start, self._y0, i, -direction)
 
     def take_back(self, t: float) -> None:

@@ -189,3 +189,21 @@ def test_an_event_function_that_raises_is_a_status_of_the_run(method):
     run.until(3.0)
     assert run.status is Status.USER_ERROR
     assert "too late" in run.reason
+
+
+@pytest.mark.parametrize("method", METHODS, ids=str)
+@pytest.mark.parametrize("direction", [0, 1, -1])
+def test_the_zero_of_a_terminal_event_is_not_found_again(method, direction):
+    oscillator = problems.Hamiltonian(lambda q, p: (q[0] ** 2 + p[0] ** 2) / 2, dof=1)
+    event = Event(lambda q, p: q[0] - 0.2 * p[0], terminal=True, direction=direction, name="section")
+    for phase in np.linspace(0.1, 6.1, 13):
+        problem = problems.Problem(oscillator, q0=[np.sin(phase)], p0=[np.cos(phase)], t_end=30.0)
+        run = start(problem, method, event)
+        for _ in range(3):
+            run.until(30.0)
+            assert run.status is Status.EVENT
+            run.y = run.y
+            run.y = run.y  # once more, at the same time
+        found = np.diff(run.events["section"].t)
+        apart = 2.0 * np.pi if direction else np.pi
+        assert found == pytest.approx([apart] * 2, abs=1e-3)  # measured 7e-5, of the method; or 0 or 1e-12
