@@ -76,7 +76,7 @@ from numpy.typing import ArrayLike, NDArray
 from problems import deprecated
 from problems.checks import CheckedOptions
 from problems.errors import InputError, shown
-from problems.problem import Problem, System
+from problems.problem import Problem, System, check_is_problem
 
 __all__ = [
     "CAPABILITIES",
@@ -843,20 +843,6 @@ def check_system(method: MethodBase, system: System) -> None:
         raise InputError(
             f"{type(method).__name__}.compile takes a system, such as problem.system, not {shown(system)}."
         )
-
-
-def check_is_problem(problem: Problem) -> None:
-    """Raise `problems.errors.InputError` for what is no problem, such as a system without a start."""
-    if isinstance(problem, Problem):
-        return
-    if isinstance(problem, System):
-        raise InputError(
-            f"problem must be a Problem, not {shown(problem)}, a system without a start; "
-            "give problems.Problem(system, y0=..., t_end=...)."
-        )
-    raise InputError(
-        f"problem must be a Problem, not {shown(problem)}; make one with problems.load or problems.Problem."
-    )
 
 
 def check_problem(problem: Problem, method: MethodBase) -> None:

@@ -12,7 +12,7 @@ from problems import emit
 from problems.catalogue import _gravity as gravity
 from problems.checks import CheckedOptions, Positive, at_least, checked_arguments
 from problems.errors import InputError, shown
-from problems.problem import Problem
+from problems.problem import Problem, check_is_problem
 from problems.systems.base import System
 from problems.systems.vector_field import VectorField
 
@@ -388,6 +388,7 @@ def bodies_of(
     >>> masses.tolist(), v[1].tolist()
     ([4.0, 2.0], [0.0, 0.5, 0.0])
     """
+    check_is_problem(problem)
     system, values = problem.system, problem.system.unpack(problem.par)
     n, masses = system.dim // 6, np.atleast_1d(np.array(values.get("m", []), dtype=np.float64))
     if system.dim % 6 or not 0 < masses.size <= n or (system.dof is not None and masses.size != n):

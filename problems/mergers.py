@@ -45,6 +45,7 @@ def contacts(radii: ArrayLike, massless: Annotated[int, at_least(0)] = 0) -> lis
 
     They are functions of the state of a problem of `nbody`: the square of the distance of two bodies, less
     that of the sum of their radii. Their names, such as ``contact_0_2``, are those of the events.
+    Bodies that overlap at the start do not come into contact there; see `merge`.
 
     Parameters
     ----------

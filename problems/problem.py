@@ -323,4 +323,18 @@ def _shown(value: ArrayLike) -> str:
     return repr(np.asarray(value, dtype=np.float64).tolist())
 
 
+def check_is_problem(problem: Problem) -> None:
+    """Raise `problems.errors.InputError` for what is no problem, such as a system without a start."""
+    if isinstance(problem, Problem):
+        return
+    if isinstance(problem, System):
+        raise InputError(
+            f"problem must be a Problem, not {shown(problem)}, a system without a start; "
+            "give problems.Problem(system, y0=..., t_end=...)."
+        )
+    raise InputError(
+        f"problem must be a Problem, not {shown(problem)}; make one with problems.load or problems.Problem."
+    )
+
+
 __all__ = ["Problem", "System"]

@@ -12,10 +12,10 @@ import numpy as np
 
 from integrators import registry
 from integrators.dynamics.vectors import Course, random_vectors, sampling_times
-from integrators.protocol import Array, MethodBase, Status, check_is_problem
+from integrators.protocol import Array, MethodBase, Status
 from problems.checks import at_least, checked_arguments
 from problems.errors import InputError
-from problems.problem import Problem
+from problems.problem import Problem, check_is_problem
 
 SAMPLES = 2048  # by default
 

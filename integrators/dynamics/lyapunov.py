@@ -18,10 +18,10 @@ import numpy as np
 from integrators import registry
 from integrators.dynamics.divergence import mean_divergence
 from integrators.dynamics.vectors import with_variations
-from integrators.protocol import Array, MethodBase, Status, check_is_problem
+from integrators.protocol import Array, MethodBase, Status
 from problems.checks import at_least, checked_arguments
 from problems.errors import InputError
-from problems.problem import Problem
+from problems.problem import Problem, check_is_problem
 
 INTERVALS = 2048  # of equal length, at whose ends at least the vectors are made orthonormal
 # How sure an exponent is follows from the slowest fluctuations of the growth, those like cos(pi k t/T). What

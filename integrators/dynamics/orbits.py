@@ -15,14 +15,14 @@ from numpy.typing import ArrayLike
 
 from integrators import registry
 from integrators.dynamics.vectors import with_variations
-from integrators.protocol import Array, MethodBase, Status, check_is_problem
+from integrators.protocol import Array, MethodBase, Status
 from integrators.refusals import as_numbers
 from integrators.running.variations import places
 from problems import emit
 from problems.analysis.structure import depends_on_time
 from problems.checks import Must, at_least, checked_arguments
 from problems.errors import InputError, shown, unknown
-from problems.problem import Problem
+from problems.problem import Problem, check_is_problem
 
 PERIOD = "period"
 CUT = 1e-10  # singular values below this part of the largest are those of directions along a family

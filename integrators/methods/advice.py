@@ -20,11 +20,11 @@ import numpy as np
 
 from integrators.methods.gauss import Gauss
 from integrators.methods.hbvm import HBVM, TOLERANCE
-from integrators.protocol import Array, Destination, MethodBase, Status, check_is_problem, offers
+from integrators.protocol import Array, Destination, MethodBase, Status, offers
 from integrators.running.integrate import prepared
 from problems.checks import checked_arguments
 from problems.errors import InputError, shown
-from problems.problem import Problem
+from problems.problem import Problem, check_is_problem
 
 LOOK = 2.0  # seconds that one run of the span may take; what comes later is not looked at
 FIRST = 1e-6  # of the span: what is looked at first, without knowing what it costs

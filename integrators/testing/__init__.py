@@ -14,7 +14,7 @@ rule does not apply to the method. `check_method` runs them all;
 
 from collections.abc import Callable
 
-from integrators.protocol import MethodBase, check_is_problem
+from integrators.protocol import MethodBase
 from integrators.testing.capabilities import (
     a_destination_leaves_the_samples_alone,
     adjoints_are_what_tangents_say,
@@ -58,6 +58,7 @@ from integrators.testing.trajectory import (
     satisfies_the_protocol,
 )
 from problems import Problem
+from problems.problem import check_is_problem
 
 __all__ = [
     "CHECKS",

@@ -5,9 +5,10 @@ from collections.abc import Callable, Iterable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from integrators.protocol import MethodBase, check_is_problem
+from integrators.protocol import MethodBase
 from integrators.running.integrate import integrate
 from problems import Problem
+from problems.problem import check_is_problem
 
 PLATEAU = 3e-13
 """Below this an error is rounding."""

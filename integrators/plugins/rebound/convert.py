@@ -5,13 +5,12 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from integrators.protocol import check_is_problem
 from integrators.refusals import check_state
 from integrators.solution import Solution
 from problems.bodies import bodies_of, nbody
 from problems.checks import checked_arguments
 from problems.errors import InputError, shown
-from problems.problem import Problem
+from problems.problem import Problem, check_is_problem
 
 SET = (
     ("gravity", ("basic",), "its gravity is {!r}, not 'basic'"),
