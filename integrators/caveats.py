@@ -14,8 +14,8 @@ from problems.emit.leaving import leaves_range
 from problems.problem import Problem, System
 from problems.trace.graph import T
 
-FEWEST = 4  # nodes whose coefficients can show a kink
-ENOUGH = 8  # nodes with which a smooth field is not taken for one with a kink
+FEWEST = 4  # nodes whose coefficients can show a discontinuity
+ENOUGH = 8  # nodes with which a smooth field is not taken for one with a discontinuity
 
 LOST = 1e-8
 """Relative change of a conserved quantity that a warning tells.
@@ -50,7 +50,7 @@ def warnings(
     caveat: str | None,
     extra: Mapping[str, Any],
 ) -> tuple[str, ...]:
-    """Return the sentences on kinks, on a start that is too small, and on units that do not suit it.
+    """Return the sentences on discontinuities, too small a start, and units that do not suit it.
 
     Parameters
     ----------
@@ -65,9 +65,9 @@ def warnings(
     extra : mapping
         `integrators.protocol.Stats.extra` of the trajectory.
     """
-    kinks, implicit = extra.get("kinks"), extra.get("implicit")
-    if caveat is None and not kinks and implicit and implicit["steps"]:
-        caveat = unseen_in_time(
+    discontinuities, implicit = extra.get("kinks"), extra.get("implicit")
+    if caveat is None and not discontinuities and implicit and implicit["steps"]:
+        caveat = undetected_in_time(
             problem, f"discontinuities are not detected in its {implicit['steps']} Newton steps"
         )
     said = () if caveat is None else (caveat,)
@@ -82,14 +82,14 @@ def warnings(
             "numbers that the field is calculated from are beyond the range of doubles, though the state "
             "is not: errors may have any size; take other units.",
         )
-    if not kinks:
+    if not discontinuities:
         return said
-    t, h = kinks[0]
+    t, h = discontinuities[0]
     place = f"between t = {t!r} and {t + h!r}" if h else f"at t = {t!r}"
     return (
         *said,
         "the right-hand side or one of its derivatives is discontinuous "
-        f"(places recorded: {len(kinks)}, the first {place}): steps were "
+        f"(places recorded: {len(discontinuities)}, the first {place}): steps were "
         "cut there, and what lies between two nodes may have been missed; give breakpoints where the "
         "times are known.",
     )
@@ -166,13 +166,13 @@ def of_losses(losses: Losses) -> tuple[str, ...]:
     )
 
 
-def unseen(problem: Problem, why: str | None) -> str | None:
-    """Return the sentence on a field with kinks that a method does not look for, if it is one.
+def undetected(problem: Problem, why: str | None) -> str | None:
+    """Return the sentence on a field with discontinuities that a method does not look for, if it is one.
 
     Parameters
     ----------
     problem : Problem
-        What is integrated; a system that is not traced cannot be asked whether it has kinks.
+        What is integrated; a system that is not traced cannot be asked whether it has discontinuities.
     why : str or None
         Why the method does not see them; ``None`` where it does.
     """
@@ -184,24 +184,24 @@ def unseen(problem: Problem, why: str | None) -> str | None:
     )
 
 
-def unseen_in_time(problem: Problem, why: str | None) -> str | None:
-    """As `unseen`, by steps with a tolerance, which formulas tell where they switch in the state."""
-    return unseen(problem, why) if problem.system.traced and switches_in_time(problem.system) else None
+def undetected_in_time(problem: Problem, why: str | None) -> str | None:
+    """As `undetected`, by steps with a tolerance, which formulas tell where they switch in the state."""
+    return undetected(problem, why) if problem.system.traced and switches_in_time(problem.system) else None
 
 
-def sees_kinks(k: int, system: System) -> bool:
-    """Whether steps with k nodes look for kinks.
+def detects_discontinuities(k: int, system: System) -> bool:
+    """Whether steps with k nodes look for discontinuities.
 
-    With few nodes a smooth field now and then looks like one with a kink. So with few nodes kinks are
-    looked for only where the traced field is known to have some.
+    With few nodes a smooth field now and then looks like one with a discontinuity. So with few nodes
+    discontinuities are looked for only where the traced field is known to have some.
     """
     return k >= ENOUGH or (k >= FEWEST and system.traced and has_kinks(system))
 
 
-def unknown_kinks(
+def unknown_discontinuities(
     problem: Problem, k: int | None, tol: float | None, breakpoints: Sequence[float]
 ) -> str | None:
-    """Return the sentence on a field that is not traced and has too few nodes to look for kinks in it.
+    """Return the sentence on a field that is not traced and has too few nodes to detect discontinuities.
 
     Nothing is said where the user gives breakpoints, or a fixed step.
     """
@@ -213,8 +213,8 @@ def unknown_kinks(
     )
 
 
-def blind(k: int | None, tol: float | None, solver: str) -> str | None:
-    """Return why HBVM(k, s) with these options does not look for kinks; ``None`` where it does.
+def why_undetected(k: int | None, tol: float | None, solver: str) -> str | None:
+    """Return why HBVM(k, s) with these options does not look for discontinuities; ``None`` where it does.
 
     Where k is chosen, it is large enough.
     """

@@ -23,12 +23,12 @@ from integrators.kernel.parts.behind import Behind
 from integrators.kernel.parts.blocks import Blocks
 from integrators.kernel.parts.controller import Controller
 from integrators.kernel.parts.counters import Counters
+from integrators.kernel.parts.discontinuities import Discontinuities
 from integrators.kernel.parts.energy import Energy
 from integrators.kernel.parts.estimate import Estimate
 from integrators.kernel.parts.events import Events
 from integrators.kernel.parts.factors import Factors
 from integrators.kernel.parts.implicit import Implicit
-from integrators.kernel.parts.kinks import Kinks
 from integrators.kernel.parts.pace import Pace
 from integrators.kernel.parts.scratch import STAGE, Scratch
 from integrators.kernel.parts.solver import Solver
@@ -184,7 +184,7 @@ class Context(Memory):
     implicit = Within(Implicit)
     controller = Within(Controller)
     estimate = Within(Estimate)
-    kinks = Within(Kinks)
+    discontinuities = Within(Discontinuities)
     behind = Within(Behind)
     surfaces = Within(Surfaces)
     events = Within(Events)

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from integrators.caveats import sees_kinks
+from integrators.caveats import detects_discontinuities
 from integrators.events.event import Event
 from integrators.kernel import tables
 from integrators.kernel.along import batch_along
@@ -78,7 +78,7 @@ MOST_EPSILON = 0.2
 """Reversible steps are no longer than this part of the field's time scale, whose density longer ones lose."""
 
 UNSEEN = 1e-12
-"""Part of a block's size that the error at a kink of the field may always be."""
+"""Part of a block's size that the error at a discontinuity of the field may always be."""
 
 
 class HBVMProgram(Compiled):
@@ -558,7 +558,7 @@ class AdaptiveProgram(HBVMProgram):
             self.from_cache = self.from_cache and self._sides.from_cache
         self.projected = projected
         self._energy = self._energy_code() if projected else None
-        looks = sees_kinks(k, system) and not self.kept
+        looks = detects_discontinuities(k, system) and not self.kept
         self._doubt, self._slowest = _decays(k, self.degree, tol, middle, looks)
         self.compile_seconds += binary.clock() - started
 
@@ -630,7 +630,7 @@ class AdaptiveProgram(HBVMProgram):
     def begin(self, pair: Pair, y: Array, par: Array, t0: float) -> None:
         """Put what a trajectory from (t0, y) begins with besides into its memory."""
         super().begin(pair, y, par, t0)
-        pair.own.kinks.numbers.doubt_end = t0
+        pair.own.discontinuities.numbers.doubt_end = t0
 
     def _new_context(self, *, partial: bool) -> Context:
         context = super()._new_context(partial=True)  # with a matrix of its own
@@ -656,8 +656,8 @@ class AdaptiveProgram(HBVMProgram):
             last = self.constants.k - 1
             context.controller.defect_aim = math.log(self.defect) / (2 * last + 1) + math.log(MARGIN)
             context.estimate.defect_decay = self.defect ** (0.5 / last)
-        context.kinks.doubt, context.kinks.slowest_decay = self._doubt, self._slowest
-        context.kinks.negligible = self._negligible
+        context.discontinuities.doubt, context.discontinuities.slowest_decay = self._doubt, self._slowest
+        context.discontinuities.negligible = self._negligible
         context.surfaces.code = self._sides.address if self._sides else 0
         context.surfaces.count = self._surfaces
         context.estimate.absolute[:] = self._absolute
@@ -727,16 +727,16 @@ class ReversibleProgram(AdaptiveProgram):
 
 
 def _decays(k: int, m: int, tol: float, middle: int, looks: bool) -> tuple[float, float]:
-    """Return `Kinks.doubt` and `Kinks.slowest_decay`, which tell a smooth field from one with a kink.
+    """Return `doubt` and `slowest_decay` of `Discontinuities`, which tell a smooth field from others.
 
     Where the error is the tolerance, coefficients of a smooth field fall off by
-    ``tol^(1/2m)`` from one degree to the next. Those of a kink fall off like 1/j^2, from the
+    ``tol^(1/2m)`` from one degree to the next. Those of a discontinuity fall off like 1/j^2, from the
     middle ones, of degrees ``middle`` and the next, to the last one. Infinite where
     nobody ``looks``.
     """
     if not looks:
         return math.inf, math.inf
     smooth, last = tol ** (0.5 / m), k - 1
-    at_a_kink = ((middle + 0.5) / last) ** 2
+    at_discontinuity = ((middle + 0.5) / last) ** 2
     doubt = min(10.0 * smooth ** (last - min(3, m - 1)), 0.1 / last**2)
-    return doubt, max(at_a_kink / 4.0, 6.0 * smooth ** (last - middle - 1))
+    return doubt, max(at_discontinuity / 4.0, 6.0 * smooth ** (last - middle - 1))

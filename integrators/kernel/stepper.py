@@ -130,8 +130,10 @@ class HBVMStepper(ABC):
         "implicit.active", "implicit.slow", "implicit.held", "implicit.left", "time_low",
         "controller.next_length", "controller.length_after", "controller.length_behind",
         "controller.error_behind", "controller.error_ahead", "controller.defect_behind",
-        "controller.defect_ahead", "controller.length_limit", "kinks.count", "kinks.end", "kinks.doubt_end",
-        "kinks.border", "kinks.border_ahead", "behind.t0", "behind.time_low", "events.seen", "events.acting",
+        "controller.defect_ahead", "controller.length_limit", "discontinuities.count", "discontinuities.end",
+        "discontinuities.doubt_end",
+        "discontinuities.boundary", "discontinuities.next_boundary", "behind.t0", "behind.time_low",
+        "events.seen", "events.acting",
         "events.time", "events.length_before", "events.acted", "surfaces.reached", "surfaces.on_surface",
         "surfaces.row", "surfaces.length_wanted", "behind.on_surface", "pace.epsilon", "pace.log_density",
         "pace.log_density_behind", "pace.density_slope", "controller.interval", "controller.restful",
@@ -140,8 +142,9 @@ class HBVMStepper(ABC):
     )  # fmt: skip
     _arrays: ClassVar[tuple[str, ...]] = (
         "state", "error", "next_state", "next_error", "values", "older_values", "blocks.weights",
-        "blocks.floored_weights", "kinks.places", "kinks.borders", "kinks.borders_behind", "kinks.lasts",
-        "kinks.lasts_behind", "behind.state", "behind.error", "estimate.expected",
+        "blocks.floored_weights", "discontinuities.records", "discontinuities.boundary_values",
+        "discontinuities.previous_boundary_values", "discontinuities.last_coefficients",
+        "discontinuities.previous_last_coefficients", "behind.state", "behind.error", "estimate.expected",
     )  # fmt: skip
     error: Exception | None = None
     """What a function of the user raised, where the status is ``USER_ERROR``."""
@@ -325,9 +328,9 @@ class HBVMStepper(ABC):
         invariants also ``"lost"``, how often one had moved in a step by more than rounding
         accounts for (k is then too small), and ``"left_out"``, the names of those that follow
         from others. With adaptive step size also the method's ``"k"`` and ``"s"`` and, where the field
-        jumps or has a kink, ``"kinks"``: pairs (t, h), the place that a step had to be cut for and the
-        length at which it was found, or the time and 0 where a step ends on a switching surface, of the first
-        64 places. With variations ``"variations"``, a dict: their iterations.
+        or a derivative of it is discontinuous, ``"kinks"``: pairs (t, h), the place that a step had to be cut
+        for and the length at which it was found, or the time and 0 where a step ends on a switching surface,
+        of the first 64 places. With variations ``"variations"``, a dict: their iterations.
         """
         counters = self._context.counters.numbers
         return Stats(

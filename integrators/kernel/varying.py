@@ -19,7 +19,7 @@ from integrators.kernel.context import (
     Context,
 )
 from integrators.kernel.native import engine
-from integrators.kernel.parts.kinks import KINKS_KEPT, NOTHING, START
+from integrators.kernel.parts.discontinuities import MOST_RECORDED, NOTHING, START
 from integrators.kernel.step.rule import FIRST_AT_REST, RESTART, SCALE_LASTS
 from integrators.kernel.stepper import Ended, HBVMStepper, Program
 from integrators.options import SHORTEST, SMALLEST
@@ -71,13 +71,13 @@ class AdaptiveStepper(HBVMStepper):
     def _begin_at_breakpoint(self) -> None:
         """Let the step ahead begin with the values beyond a breakpoint, if one is here."""
         if any(map(self._is_at, self._breakpoints.tolist())):
-            self._context.kinks.border = START
+            self._context.discontinuities.boundary = START
 
     def _extra(self) -> dict[str, Any]:
         c, context = self._program.constants, self._context
         extra = {**super()._extra(), "k": c.k, "s": c.s}
-        if kinks := context.kinks.count:
-            kept = context.kinks.places.reshape(-1, 2)[: min(kinks, KINKS_KEPT)]
+        if discontinuities := context.discontinuities.count:
+            kept = context.discontinuities.records.reshape(-1, 2)[: min(discontinuities, MOST_RECORDED)]
             extra["kinks"] = [(float(t), float(h)) for t, h in kept]
         return extra
 
@@ -142,7 +142,7 @@ class AdaptiveStepper(HBVMStepper):
         length = ctx.controller.next_length
         ctx.controller.next_length = math.copysign(max(abs(length), RESTART * abs(t)), length)
         ctx.solved = ctx.blocks.age = 0
-        ctx.kinks.border = START
+        ctx.discontinuities.boundary = START
 
     def _take_implicit(self) -> None:
         """Put the implicit solver to work; what the fixed-point iteration allowed does not bind it."""
@@ -171,7 +171,7 @@ class AdaptiveStepper(HBVMStepper):
             )
             ctx.pace.epsilon *= -1.0
             ctx.controller.next_length = ctx.pace.epsilon * math.exp(-ctx.pace.log_density)
-        ctx.kinks.border = NOTHING
+        ctx.discontinuities.boundary = NOTHING
         self._forget()
 
     def _to(self, times: Array, between: int) -> Samples:
@@ -227,9 +227,12 @@ class AdaptiveStepper(HBVMStepper):
         ctx.controller.next_length = ahead * max(
             FIRST_AT_REST * ctx.controller.interval, abs(ctx.controller.next_length)
         )
-        places = ctx.kinks.places.reshape(-1, 2)[: min(ctx.kinks.count, KINKS_KEPT), 0]
-        if len(places) and ahead * (places[-1] - self.t) > -FIRST_AT_REST * ctx.controller.interval:
-            ctx.kinks.count -= 1  # by a block's own size; if it is one by this size, it is found again
+        recorded = ctx.discontinuities.records.reshape(-1, 2)[
+            : min(ctx.discontinuities.count, MOST_RECORDED), 0
+        ]
+        if len(recorded) and ahead * (recorded[-1] - self.t) > -FIRST_AT_REST * ctx.controller.interval:
+            # By a block's own size; if it is one by this size, it is found again
+            ctx.discontinuities.count -= 1
 
     def _expected(self, ahead: float) -> Array:
         """Return the sizes that errors of the blocks may be relative to."""
@@ -301,7 +304,7 @@ class AdaptiveStepper(HBVMStepper):
         """Take steps whatever their errors are."""
         ctx = self._context
         ctx.controller.allowed_error = ctx.controller.allowed_defect = ctx.controller.error_aim = (
-            ctx.kinks.doubt
+            ctx.discontinuities.doubt
         ) = math.inf
         ctx.estimate.asks = 0
 

@@ -4,7 +4,7 @@ import re
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from integrators.caveats import blind, unknown_kinks, unseen, unseen_in_time
+from integrators.caveats import undetected, undetected_in_time, unknown_discontinuities, why_undetected
 from integrators.methods.hbvm import HBVM, Solver
 from integrators.options import Absolute, Breakpoints, Count, Stages, Step, Tolerance
 from integrators.protocol import MethodBase, Program
@@ -182,10 +182,10 @@ class Gauss(MethodBase):
         return None
 
     def caveat(self, problem: Problem) -> str | None:
-        """Return a warning for a field with kinks that these options do not look for; see `HBVM`."""
-        why = blind(self.s, self.tol, self.solver)
-        kinks = unseen(problem, why) if self.tol is None else unseen_in_time(problem, why)
-        return kinks or unknown_kinks(problem, self.s, self.tol, self.breakpoints)
+        """Return a warning for a field with discontinuities that these options do not detect; see `HBVM`."""
+        why = why_undetected(self.s, self.tol, self.solver)
+        discontinuities = undetected(problem, why) if self.tol is None else undetected_in_time(problem, why)
+        return discontinuities or unknown_discontinuities(problem, self.s, self.tol, self.breakpoints)
 
     def compile(self, system: System) -> Program:
         """Compile as `HBVM.compile` does, Poisson systems like any other."""

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from integrators.caveats import blind, unknown_kinks, unseen, unseen_in_time
+from integrators.caveats import undetected, undetected_in_time, unknown_discontinuities, why_undetected
 from integrators.options import Absolute, Breakpoints, Count, Stages, Step, Tolerance
 from integrators.protocol import MethodBase, Program
 from problems.errors import InputError
@@ -63,15 +63,15 @@ class HBVM(MethodBase):
 
     A step evaluates the right-hand side only at its k nodes. A pulse or a narrow force shorter than the
     distance between nodes may be missed, and no error estimate can detect it. For such right-hand sides give
-    ``breakpoints`` (times) or ``max_step``. Discontinuities of the right-hand side or of its derivative
-    (kinks) that affect the values at the nodes, such as those of ``m.abs`` and ``m.where``, are detected, and
-    the steps are shortened until their effect is negligible; ``stats.extra["kinks"]`` has their times, and
-    the solution's ``warnings`` report them. With adaptive steps (``tol``) the formula determines the states
-    at which these functions and tables switch, so that weak kinks are found as well. Switches in time, and
-    those of fields that are code, are detected from the values at the nodes: with at least eight nodes, or
-    four for a formula with these functions, in steps that the fixed-point iteration solves. With ``h``, and
-    for Poisson systems, kinks are not detected; ``warnings`` say so for a field that has them
-    (`test_adaptive_steps`, `test_weak_kinks`).
+    ``breakpoints`` (times) or ``max_step``. Discontinuities of the right-hand side or of its
+    derivative that affect the values at the nodes, such as those of ``m.abs`` and ``m.where``, are detected,
+    and the steps are shortened until their effect is negligible; ``stats.extra["kinks"]`` has their times,
+    and the solution's ``warnings`` report them. With adaptive steps (``tol``) the formula determines the
+    states at which these functions and tables switch, so that weak discontinuities are found as well.
+    Switches in time, and those of fields that are code, are detected from the values at the nodes: with at
+    least eight nodes, or four for a formula with these functions, in steps that the fixed-point iteration
+    solves. With ``h``, and for Poisson systems, discontinuities are not detected; ``warnings`` say so for a
+    field that has them (`test_adaptive_steps`, `test_weak_discontinuities`).
 
     These equations do not conserve the energy of a Poisson system y' = B(y) grad H(y)
     whose structure B varies. There, with ``G_i = sum_l b_l P_i(c_l) grad H(Y_l)``,
@@ -225,14 +225,16 @@ class HBVM(MethodBase):
         return self._refusal(problem.system)
 
     def caveat(self, problem: Problem) -> str | None:
-        """Name a field with kinks that these options do not look for; see the class."""
+        """Name a field with discontinuities that these options do not look for; see the class."""
         poisson = problem.system.kind == "poisson"
         why = (
             "the steps that keep a Poisson system's energy do not detect discontinuities" if poisson else None
         )
-        why = why or blind(self.k, self.tol, self.solver)
-        kinks = unseen(problem, why) if poisson or self.tol is None else unseen_in_time(problem, why)
-        return kinks or unknown_kinks(problem, self.k, self.tol, self.breakpoints)
+        why = why or why_undetected(self.k, self.tol, self.solver)
+        discontinuities = (
+            undetected(problem, why) if poisson or self.tol is None else undetected_in_time(problem, why)
+        )
+        return discontinuities or unknown_discontinuities(problem, self.k, self.tol, self.breakpoints)
 
     def conserved(self, system: System) -> dict[str, float]:
         """Return the energy, with a tolerance: at rounding where k is chosen, or with a projection."""

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from integrators.caveats import unseen
+from integrators.caveats import undetected
 from integrators.methods.hbvm import CITATION as BOOK
 from integrators.options import Absolute, Stages, Step, Tolerance
 from integrators.protocol import MethodBase, Program
@@ -164,8 +164,8 @@ class LineIntegral(MethodBase):
         return None
 
     def caveat(self, problem: Problem) -> str | None:
-        """Name a field with kinks: they are not looked for."""
-        return unseen(problem, "line integral methods do not detect discontinuities")
+        """Name a field with discontinuities: they are not looked for."""
+        return undetected(problem, "line integral methods do not detect discontinuities")
 
     def conserved(self, system: System) -> dict[str, float]:
         """Return the invariants that are conserved, if the step size is adaptive."""

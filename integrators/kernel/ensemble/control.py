@@ -3,7 +3,8 @@
 Most steps are good enough and followed by one a little longer or shorter: these are judged, taken and
 followed here, by the rules of `integrators.kernel.step.estimate` and `integrators.kernel.step.control`. A
 lane where anything else happens (a step that failed or was too long, a sample that is near, a coefficient
-that looks like a kink's) is left as it is, and marked for `integrators.kernel.ensemble.own` to look after.
+that looks like that of a discontinuity) is left as it is, and marked for `integrators.kernel.ensemble.own` to
+look after.
 """
 
 from math import sqrt
@@ -41,10 +42,11 @@ MEASURED = "size", "moved", "strict", "floored"  # rooms that the iteration does
 class Control:
     """Writes the end of a step.
 
-    Estimate, verdict and next length are the functions of `integrators.kernel.step.estimate`, `kinks` and
-    `control` that a single trajectory calls, applied to rows. What differs: coefficients are sums in another
-    order, so that they differ in the last bits; lengths are not rounded to ratios with tables, of which lanes
-    have none; and only the ordinary end of a step is written. Every other one is left to `own.settle`.
+    Estimate, verdict and next length are the functions of `integrators.kernel.step.estimate`,
+    `discontinuities` and `control` that a single trajectory calls, applied to rows. What differs:
+    coefficients are sums in another order, so that they differ in the last bits; lengths are not rounded to
+    ratios with tables, of which lanes have none; and only the ordinary end of a step is written. Every other
+    one is left to `own.settle`.
 
     Parameters
     ----------
@@ -74,7 +76,7 @@ class Control:
     def judge(self) -> None:
         """Set `error`, `defect`, where blocks are `certain` and `visible`; see `estimate`."""
         from integrators.kernel.step import estimate as rules  # imports numba, which compiling needs anyhow
-        from integrators.kernel.step.kinks import gap_allowed
+        from integrators.kernel.step.discontinuities import gap_allowed
 
         w, b = self.w, self.w.b
         error, defect = (w.variable(w.kind, w.zero.value) for _ in range(2))
@@ -192,9 +194,9 @@ class Control:
         from integrators.kernel.step.estimate import is_gap
 
         w, slots = self.w, Group.slots
-        w.put(end, w.array(slots["ends_ahead"]), d)
-        w.put(last, w.array(slots["lasts_ahead"]), d)
-        behind, last_behind = (w.get(w.array(slots[name]), d) for name in ("ends", "lasts"))
+        w.put(end, w.array(slots["next_ends"]), d)
+        w.put(last, w.array(slots["next_last_coefficients"]), d)
+        behind, last_behind = (w.get(w.array(slots[name]), d) for name in ("ends", "last_coefficients"))
         apart = (start - behind).absolute()
         return where(is_gap(apart, last, last_behind), apart, 0.0)
 
@@ -273,9 +275,13 @@ class Control:
             w.put(value.where(good, self.row(name)), w.array(slots[name]))
         rows = w.form.rows
         dim = rows * (2 if w.form.second else 1)
-        ends, lasts = w.array(slots["ends"]), w.array(slots["lasts"])
+        ends, last_coefficients = w.array(slots["ends"]), w.array(slots["last_coefficients"])
         moves = ("next_state", w.state, dim), ("next_error", w.error, dim)
-        for ahead, now, count in (*moves, ("ends_ahead", ends, rows), ("lasts_ahead", lasts, rows)):
+        for ahead, now, count in (
+            *moves,
+            ("next_ends", ends, rows),
+            ("next_last_coefficients", last_coefficients, rows),
+        ):
             source = w.array(slots[ahead])
 
             def move(d: Any, source: Any = source, now: Any = now) -> None:

@@ -78,10 +78,11 @@ class Group(Memory):
     doubt = Real()
     negligible = Real()  # part of a block's size that the error at a jump may be; infinite: nobody looks
     outermost = Real()  # the first node
-    ends = Array("rows", "lanes")  # the field at the end of the step behind; see `Kinks.borders`
-    lasts = Array("rows", "lanes")  # its last coefficients there
-    ends_ahead = Array("rows", "lanes")
-    lasts_ahead = Array("rows", "lanes")
+    # The field at the end of the step behind; see `Discontinuities.boundary_values`
+    ends = Array("rows", "lanes")
+    last_coefficients = Array("rows", "lanes")  # its last coefficients there
+    next_ends = Array("rows", "lanes")
+    next_last_coefficients = Array("rows", "lanes")
     gaps = Array("rows", "lanes")  # between blocks of the field as two steps have it where they meet
     longest = Real()  # no step is longer
     busy = Real()  # sweeps to aim at, at most

@@ -4,7 +4,7 @@ from integrators.kernel.context import Context
 from integrators.kernel.ensemble.group import ARRIVED, LEFT
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
-from integrators.kernel.step.kinks import arrived
+from integrators.kernel.step.discontinuities import confirm_previous_step
 from integrators.kernel.step.vary import remaining
 
 context_at = view(Context)
@@ -79,7 +79,7 @@ def write(group, lane, ctx):
         count += 1
     group.samples_written[lane] = count
     if count == group.count:
-        unload(group, lane, ARRIVED if arrived(ctx) and knows_events(group, lane) else LEFT)
+        unload(group, lane, ARRIVED if confirm_previous_step(ctx) and knows_events(group, lane) else LEFT)
 
 
 @compiled

@@ -16,13 +16,13 @@ from integrators.kernel.ensemble.lane import clear, context_at, fetch, place, un
 from integrators.kernel.ensemble.watch import has_room, keep_start, look_at_start, watch, watch_ordinary
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
+from integrators.kernel.parts.discontinuities import EXTRAPOLATED
 from integrators.kernel.parts.implicit import FIXED_POINT
-from integrators.kernel.parts.kinks import EXTRAPOLATED
 from integrators.kernel.simd.memory import call_steps, put, splat8
 from integrators.kernel.step.anew import reset
 from integrators.kernel.step.begin import INFINITY, is_within_reach
 from integrators.kernel.step.control import defect_power, error_power, is_distinct
-from integrators.kernel.step.kinks import end_behind, is_near_one
+from integrators.kernel.step.discontinuities import end_behind, is_near_discontinuity
 from integrators.kernel.step.rule import FIRST_RATE, SMALLEST
 from integrators.kernel.step.size import speed_of
 from integrators.kernel.step.vary import (
@@ -62,8 +62,8 @@ def load(group, lane):
     ctx.t0 = group.start_time
     ctx.controller.stop = ctx.controller.length_limit = INFINITY
     ctx.controller.next_length, ctx.controller.length_behind = group.first_length, 0.0
-    ctx.kinks.doubt_end = group.start_time
-    ctx.kinks.count = ctx.counters.steps = 0
+    ctx.discontinuities.doubt_end = group.start_time
+    ctx.discontinuities.count = ctx.counters.steps = 0
     begin_attempts(ctx)
     reset(ctx, group.starts + group.dim * i)
     for d in range(group.dim):
@@ -103,7 +103,7 @@ def aim(group, lane):
         ctx.controller.defect_behind,
     )
     group.stop[lane] = ctx.controller.stop
-    suspect = ctx.controller.attempts > 0 or is_near_one(ctx, h)
+    suspect = ctx.controller.attempts > 0 or is_near_discontinuity(ctx, h)
     first = ctx.controller.length_behind == 0.0 or h != ctx.controller.next_length
     group.unwatched[lane] = 0.0 if suspect or first else float(CRAWL_STEPS - ctx.counters.steps % CRAWL_STEPS)
     group.since[lane] = 0.0
@@ -128,7 +128,7 @@ def enter(group, lane):
 @compiled
 def catch_up(group, lane, ctx):
     """Let a lane's context know of the steps that were taken without it."""
-    controller, kinks = ctx.controller, ctx.kinks
+    controller, discontinuities = ctx.controller, ctx.discontinuities
     ctx.t0, ctx.time_low = group.t0[lane], group.time_low[lane]
     controller.next_length = group.h[lane]
     ctx.length = controller.length_behind = group.length_behind[lane]
@@ -139,10 +139,10 @@ def catch_up(group, lane, ctx):
     for d in range(group.dim):
         ctx.state[place(ctx, d)] = group.state[group.lanes * d + lane]
     for d in range(group.rows):
-        put(kinks.borders_behind, 8 * d, splat8(0.0))
-        kinks.borders_behind[8 * d] = group.ends[group.lanes * d + lane]
-        kinks.lasts_behind[d] = group.lasts[group.lanes * d + lane]
-    kinks.border = EXTRAPOLATED
+        put(discontinuities.previous_boundary_values, 8 * d, splat8(0.0))
+        discontinuities.previous_boundary_values[8 * d] = group.ends[group.lanes * d + lane]
+        discontinuities.previous_last_coefficients[d] = group.last_coefficients[group.lanes * d + lane]
+    discontinuities.boundary = EXTRAPOLATED
 
 
 @compiled
@@ -163,7 +163,7 @@ def settle(group, lane):
         if group.events == 0 or watch(group, lane, ctx):
             step(group, lane, ctx)
         leave_if_slow(group, lane, ctx)
-    elif ctx.kinks.count or ctx.controller.attempts >= FUTILE:
+    elif ctx.discontinuities.count or ctx.controller.attempts >= FUTILE:
         unload(group, lane, LEFT)
 
 
@@ -183,7 +183,7 @@ def step(group, lane, ctx):
         group.error[group.lanes * d + lane] = group.next_error[group.lanes * d + lane]
     for d in range(group.rows):
         group.ends[group.lanes * d + lane] = end_behind(ctx, d)
-        group.lasts[group.lanes * d + lane] = ctx.kinks.lasts_behind[d]
+        group.last_coefficients[group.lanes * d + lane] = ctx.discontinuities.previous_last_coefficients[d]
     write(group, lane, ctx)
 
 
@@ -219,13 +219,13 @@ def crawls(group, lane, ctx):
 @compiled
 def share(group, ctx):
     """Let a group know what its steps are judged by."""
-    controller, estimate, kinks = ctx.controller, ctx.estimate, ctx.kinks
+    controller, estimate, discontinuities = ctx.controller, ctx.estimate, ctx.discontinuities
     group.allowed_error, group.allowed_defect = controller.allowed_error, controller.allowed_defect
     group.error_power, group.defect_power = error_power(controller.error_degree), defect_power(ctx.k)
     group.error_aim, group.defect_aim = controller.error_aim, controller.defect_aim
     group.error_decay, group.defect_decay = estimate.error_decay, estimate.defect_decay
-    group.least_slope, group.doubt, group.busy = estimate.least_slope, kinks.doubt, BUSY
-    group.negligible = kinks.negligible if kinks.doubt < INFINITY else INFINITY
+    group.least_slope, group.doubt, group.busy = estimate.least_slope, discontinuities.doubt, BUSY
+    group.negligible = discontinuities.negligible if discontinuities.doubt < INFINITY else INFINITY
     group.outermost = ctx.tables.nodes[0]
     group.longest = controller.longest
     group.worth = INFINITY

@@ -17,11 +17,11 @@ from integrators.kernel.events.value import call_entry
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.engine import ACT, GO_ON
 from integrators.kernel.native.jit import compiled
-from integrators.kernel.parts.kinks import EXTRAPOLATED, NOTHING
+from integrators.kernel.parts.discontinuities import EXTRAPOLATED, NOTHING
 from integrators.kernel.simd.memory import call_look, get, put
 from integrators.kernel.step.begin import INFINITY, set_factors
+from integrators.kernel.step.discontinuities import differs_at_an_end
 from integrators.kernel.step.estimate import estimate
-from integrators.kernel.step.kinks import differs_at_an_end
 from integrators.kernel.step.rule import FIRST_RATE
 from integrators.kernel.step.vary import begin_attempts
 
@@ -88,7 +88,7 @@ def watch(group, lane, ctx):
 def watch_ordinary(group, lane):
     """Look for events in a step that has been taken with all others; return whether it stays taken."""
     ctx = context_at(group.contexts[lane])
-    controller, kinks = ctx.controller, ctx.kinks
+    controller, discontinuities = ctx.controller, ctx.discontinuities
     ctx.t0, ctx.time_low = group.start_t0[lane], group.start_time_low[lane]
     ctx.h = group.length_behind[lane]
     fetch(group, lane, ctx)
@@ -100,7 +100,10 @@ def watch_ordinary(group, lane):
     controller.next_length, controller.length_after = ctx.h, group.h[lane]
     controller.length_limit = group.length_limit[lane]
     estimate(ctx)  # which notes what is known of the field at both ends
-    kinks.border, kinks.border_ahead = NOTHING, EXTRAPOLATED if kinks.doubt < INFINITY else NOTHING
+    discontinuities.boundary, discontinuities.next_boundary = (
+        NOTHING,
+        EXTRAPOLATED if discontinuities.doubt < INFINITY else NOTHING,
+    )
     end_step(group, lane, ctx, outcome)
     return False
 
@@ -123,7 +126,7 @@ def end_step(group, lane, ctx, outcome):
     terminal = outcome == HALTED and search.halted == TERMINAL
     # What ends the step must not be found in one that a jump beyond its nodes would undo.
     if not (terminal or outcome == ACTS) or (
-        ctx.kinks.border_ahead == EXTRAPOLATED and differs_at_an_end(ctx)
+        ctx.discontinuities.next_boundary == EXTRAPOLATED and differs_at_an_end(ctx)
     ):
         unload(group, lane, LEFT)
     elif terminal:

@@ -4,7 +4,7 @@ from integrators.kernel.native.memory import Array, Integer, Part, Real
 
 
 class Behind(Part):
-    """The state before the step behind, to go back to; see `step.kinks.undo`."""
+    """The state before the step behind, to go back to; see `step.discontinuities.undo`."""
 
     state = Array(2, "padded")
     error = Array(2, "padded")

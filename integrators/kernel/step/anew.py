@@ -2,8 +2,8 @@
 
 from integrators.kernel.context import DONE, UNSOLVED
 from integrators.kernel.native.jit import compiled
+from integrators.kernel.parts.discontinuities import NOTHING
 from integrators.kernel.parts.implicit import ALWAYS_IMPLICIT
-from integrators.kernel.parts.kinks import NOTHING
 from integrators.kernel.simd.memory import put, splat8
 from integrators.kernel.step.begin import set_factors
 from integrators.kernel.step.estimate import first_length, shorten_first
@@ -40,7 +40,7 @@ def begin_anew(ctx):
     ctx.length = ctx.older_length = 0.0
     ctx.n = ctx.blocks.age = solver.free = 0
     ctx.solved = UNSOLVED
-    ctx.kinks.border = ctx.kinks.border_ahead = NOTHING
+    ctx.discontinuities.boundary = ctx.discontinuities.next_boundary = NOTHING
     find_surface(ctx)
     solver.outcome = DONE
     ctx.time_low, solver.rate = 0.0, FIRST_RATE

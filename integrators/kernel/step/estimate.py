@@ -27,8 +27,8 @@ from integrators.kernel.step.stages import offset
 from integrators.kernel.step.sweep import evaluate
 
 UNSEEN = 1e-13  # part of a block that rounding accounts for in a step that the fixed-point iteration solves
-SLIGHT = 1e-3  # part of the error allowed that a kink counts as where it is negligible
-NARROWEST = 1e-12  # part of the time: shorter steps do not look for a kink any more
+SLIGHT = 1e-3  # part of the error allowed that a discontinuity counts as where it is negligible
+NARROWEST = 1e-12  # part of the time: shorter steps do not look for a discontinuity any more
 # Times as much is negligible in such a step: next to a zero of a component none might be short enough.
 BESIDE_NOTHING = 1e3
 OUTSIDE = 100.0  # times the last coefficients: a smooth field is no farther from its polynomial at the ends
@@ -118,9 +118,17 @@ def compare_ends(ctx):
 
     As their polynomials say. It is done last, since the length of the next step has not to wait for it.
     """
-    kinks = ctx.kinks
-    gammas, borders, behind, gaps = ctx.estimate.coefficients, kinks.borders, kinks.borders_behind, kinks.gaps
-    lasts, lasts_behind = kinks.lasts, kinks.lasts_behind
+    discontinuities = ctx.discontinuities
+    gammas, boundary_values, behind, gaps = (
+        ctx.estimate.coefficients,
+        discontinuities.boundary_values,
+        discontinuities.previous_boundary_values,
+        discontinuities.gaps,
+    )
+    last_coefficients, previous_last_coefficients = (
+        discontinuities.last_coefficients,
+        discontinuities.previous_last_coefficients,
+    )
     table, values, two = ctx.estimate.estimators, ctx.values, ctx.route == 16
     apart = False
     for d in range(ctx.rows):
@@ -129,20 +137,20 @@ def compare_ends(ctx):
             start, end = of_two(table, AT_START, x, y), of_two(table, AT_END, x, y)
         else:
             start, end = coefficient(ctx, d, AT_START), coefficient(ctx, d, AT_END)
-        put(borders, 8 * d, end)
+        put(boundary_values, 8 * d, end)
         gaps[d] = far = abs(total(start - get(behind, 8 * d)))
-        lasts[d] = last = greatest(gammas[8 * d + BEFORE_LAST], gammas[8 * d + LAST])
-        apart |= is_gap(far, last, lasts_behind[d])
-    kinks.apart = 1 if apart else 0
+        last_coefficients[d] = last = greatest(gammas[8 * d + BEFORE_LAST], gammas[8 * d + LAST])
+        apart |= is_gap(far, last, previous_last_coefficients[d])
+    discontinuities.apart = 1 if apart else 0
 
 
 @compiled
 def stays(ctx, d, last):
-    """Whether the last coefficient of a row is as large, beside those from the middle, as at a kink."""
+    """Whether a row's last coefficient is as large, beside those from the middle, as at a discontinuity."""
     middle = greatest(
         size(total(coefficient(ctx, d, MIDDLE))), size(total(coefficient(ctx, d, AFTER_MIDDLE)))
     )
-    return last > ctx.kinks.slowest_decay * middle
+    return last > ctx.discontinuities.slowest_decay * middle
 
 
 @for_both_widths
@@ -223,13 +231,13 @@ def is_visible(h, gamma, scale):
 
 @compiled
 def note_what_stays(ctx):
-    """Note for each block the largest last coefficient that is as large as at a kink; 0: none."""
+    """Note for each block the largest last coefficient that is as large as at a discontinuity; 0: none."""
     abrupt = ctx.estimate.abrupt
     for d in range(ctx.rows):
         gammas = ctx.estimate.coefficients + 8 * d
         low = lowest(gammas[GAMMA_1], gammas[GAMMA_2], gammas[GAMMA_3])
         high = greatest(gammas[BEFORE_LAST], gammas[LAST])
-        if is_doubtful(low, high, ctx.kinks.doubt) and stays(ctx, d, gammas[LAST]):
+        if is_doubtful(low, high, ctx.discontinuities.doubt) and stays(ctx, d, gammas[LAST]):
             b = ctx.blocks.of_row[d]
             abrupt[b] = greatest(abrupt[b], high)
 
@@ -270,21 +278,21 @@ def estimate(ctx):
     of the size of the quadrature's error or larger. Both relative to the size of each
     block of the state; the largest of all. A block whose field is nothing beside that of
     others in its group may be moved by their rounding alone, which no step is short
-    enough for: its gamma counts as a part of theirs, and what of it does not fall off is no kink.
+    enough for: its gamma counts as a part of theirs, and what of it does not fall off is no discontinuity.
 
-    All this is true of coefficients that fall off geometrically. At a jump or a kink of
+    All this is true of coefficients that fall off geometrically. At a discontinuity of
     the field they do not: |gamma_j| falls off like 1/j or 1/j^2, and the error of the
-    quadrature is of the size of h |gamma_{k-1}| itself. `Kinks.kinked` says whether there is more
-    of that than rounding and tolerance account for. If there is less, nothing is gained
-    by cutting the step further, whatever the squares are. Where the formulas tell that a switching surface
-    is crossed (`Surfaces.crossed`), all that the last coefficients are counts as a kink's.
+    quadrature is of the size of h |gamma_{k-1}| itself. `Discontinuities.not_smooth` says whether there is
+    more of that than rounding and tolerance account for. If there is less, nothing is gained by cutting the
+    step further, whatever the squares are. Where the formulas tell that a switching surface is crossed
+    (`Surfaces.crossed`), all that the last coefficients are counts as that of a discontinuity.
 
     From rest the size is what the field makes of a block in this very step. If it begins like a power of t,
     the squares are the same at all lengths of the step; if it begins in the field's rounding or with a
     jump, they are about 1. No step is good enough then by the block's own size, and `Estimate.expected`, that
     which it will reach, takes its place until `Estimate.borrowed` is 0 again.
     """
-    kinks = ctx.kinks
+    discontinuities = ctx.discontinuities
     h = abs(ctx.h)
     if ctx.route == 16:
         take_coefficients_of_two(ctx)
@@ -300,11 +308,11 @@ def estimate(ctx):
     allowed, allowed_defect, negligible = (
         ctx.controller.allowed_error,
         ctx.controller.allowed_defect,
-        kinks.negligible,
+        discontinuities.negligible,
     )
     narrow = h <= NARROWEST * abs(ctx.t0)
     error, defect = 0.0, 0.0
-    kinked = borrowed = 0
+    not_smooth = borrowed = 0
     rescaled, slopes, absolute = ctx.estimate.rescaled, ctx.estimate.slope, ctx.estimate.absolute
     for b in range(ctx.blocks.count):
         steepest = steepest_beside(ctx, b)
@@ -321,10 +329,13 @@ def estimate(ctx):
             most, most_defect = INFINITY, INFINITY
             if doubtful and high > 0.0:
                 slight = BESIDE_NOTHING * negligible if narrow else negligible
-                if kinks.count > 0 and h * max(high, max(gamma_error, gamma_last)) <= slight * scale:
+                if (
+                    discontinuities.count > 0
+                    and h * max(high, max(gamma_error, gamma_last)) <= slight * scale
+                ):
                     most, most_defect = SLIGHT * allowed, SLIGHT * allowed_defect
                 elif h * high > negligible * scale and not narrow:
-                    kinked = 1
+                    not_smooth = 1
             block_error = least(most, local_error(h, gamma_error, slope, scale))
             error = greatest(error, block_error)
             if absolute[b] > own:
@@ -336,7 +347,7 @@ def estimate(ctx):
                 fits = block_error * times <= allowed and block_defect * times <= allowed_defect
                 if not fits or (doubtful and h * high > negligible * own):
                     borrowed = 1
-    kinks.kinked, ctx.estimate.borrowed = kinked, borrowed
+    discontinuities.not_smooth, ctx.estimate.borrowed = not_smooth, borrowed
     compare_ends(ctx)
     return error, defect
 
@@ -345,7 +356,7 @@ def estimate(ctx):
 def measure_blocks(ctx):
     """Set the blocks' scales and coefficients; return whether one does not fall off well enough."""
     blocks = ctx.blocks
-    h, doubt = abs(ctx.h), ctx.kinks.doubt
+    h, doubt = abs(ctx.h), ctx.discontinuities.doubt
     error_decay, defect_decay = ctx.estimate.error_decay, ctx.estimate.defect_decay
     scale, slopes, gamma_error, gamma_last = (
         ctx.estimate.scale,

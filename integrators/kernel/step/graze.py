@@ -101,7 +101,7 @@ def matters(ctx, low, width):
     call_field(ctx.field, surfaces.times, ctx.scratch.sums, ctx.par, values)
     ctx.counters.evaluations += lanes
     # Unseen for no longer than the states that are looked at.
-    least = ctx.kinks.negligible / (abs(ctx.h) * width * (lanes - 1))
+    least = ctx.discontinuities.negligible / (abs(ctx.h) * width * (lanes - 1))
     for d in range(ctx.rows):
         i = 8 * d
         smooth = BESIDE * max(max(gammas[i + 4], gammas[i + 5]), max(gammas[i + 6], gammas[i + 7]))

@@ -5,8 +5,8 @@ from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.step.act import act, end_at_action, step_or_act
 from integrators.kernel.step.advance import looked, step, watched
+from integrators.kernel.step.discontinuities import confirm_previous_step, is_smooth_to_end
 from integrators.kernel.step.estimate import shorten_first
-from integrators.kernel.step.kinks import arrived, holds
 from integrators.kernel.step.sample import dimension, followed, sample, write
 from integrators.kernel.step.vary import CLOSE, ready, remaining, take
 
@@ -38,7 +38,7 @@ def approach(ctx, t, budget):
     while True:
         rest, begin = remaining(ctx, t), ctx.t0
         if rest == 0.0:
-            if arrived(ctx):
+            if confirm_previous_step(ctx):
                 return DONE, budget
             continue
         outcome = ready(ctx)
@@ -48,7 +48,9 @@ def approach(ctx, t, budget):
             rest = remaining(ctx, t)
         rest, h = abs(rest), abs(ctx.h)
         inside = rest < h - CLOSE * abs(t)
-        if (watched(ctx) or (inside and rest > (1.0 - ctx.tables.nodes[0]) * h)) and not holds(ctx):
+        if (watched(ctx) or (inside and rest > (1.0 - ctx.tables.nodes[0]) * h)) and not is_smooth_to_end(
+            ctx
+        ):
             continue
         outcome = look_first(ctx)
         if outcome != DONE:
@@ -136,7 +138,7 @@ def take_steps(ctx, times, out, budget):
         taken = ctx.counters.steps
         outcome = DONE
         over = remaining(ctx, end) == 0.0 or count == budget > 0
-        if over and arrived(ctx):
+        if over and confirm_previous_step(ctx):
             return DONE if remaining(ctx, end) == 0.0 else BUDGET
         if not over:
             outcome = ready(ctx)
@@ -145,7 +147,7 @@ def take_steps(ctx, times, out, budget):
             ctx.samples_written = count
         if outcome != DONE:
             return outcome
-        if over or (watched(ctx) and not holds(ctx)):
+        if over or (watched(ctx) and not is_smooth_to_end(ctx)):
             continue
         outcome = look_first(ctx)
         if outcome != DONE:

@@ -5,10 +5,10 @@ from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.memory import call_follow, get, put
 from integrators.kernel.step.advance import solve
 from integrators.kernel.step.begin import predict, prepare, rewind, set_step
+from integrators.kernel.step.discontinuities import keep_end_of_part
 from integrators.kernel.step.estimate import ALIKE
 from integrators.kernel.step.finish import arrive, finish
 from integrators.kernel.step.handover import settle_part
-from integrators.kernel.step.kinks import keep_end_of_part
 from integrators.kernel.step.size import take_sizes
 from integrators.kernel.step.sums import time_of_step
 from integrators.kernel.step.sweep import project

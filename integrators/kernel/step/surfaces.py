@@ -12,7 +12,7 @@ from integrators.kernel.parts.surfaces import AT_ORIGIN, END_ACROSS, MOST_SIDES,
 from integrators.kernel.simd.memory import call_field
 from integrators.kernel.step.begin import INFINITY
 from integrators.kernel.step.control import is_distinct
-from integrators.kernel.step.kinks import end_behind
+from integrators.kernel.step.discontinuities import end_behind
 from integrators.kernel.step.sample import interpolate
 
 # What comes of a step that crosses a surface, or was to end on one: judged like all others; tried again with

@@ -18,8 +18,8 @@ from integrators.kernel.context import (
     UNSOLVED,
 )
 from integrators.kernel.native.jit import compiled
+from integrators.kernel.parts.discontinuities import NOTHING, START
 from integrators.kernel.parts.implicit import FIXED_POINT
-from integrators.kernel.parts.kinks import NOTHING, START
 from integrators.kernel.parts.surfaces import AT_STEP_END, END_ACROSS, NO_SURFACE
 from integrators.kernel.simd.operations import binary_log, least
 from integrators.kernel.step.begin import INFINITY, begin, on_table, set_step
@@ -41,12 +41,12 @@ from integrators.kernel.step.control import (
     log_ratio,
     room_for_longer,
 )
+from integrators.kernel.step.discontinuities import has_discontinuity, keep_end, record, undo
 from integrators.kernel.step.estimate import estimate, estimate_implicit, log_decay
 from integrators.kernel.step.finish import count_step, finish
 from integrators.kernel.step.graze import grazes
 from integrators.kernel.step.handover import solve_implicitly, want_solver
 from integrators.kernel.step.iterate import close, extra_iterations, settle, test
-from integrators.kernel.step.kinks import count, keep_end, kink, undo
 from integrators.kernel.step.reversible import keep_pace
 from integrators.kernel.step.rule import FARTHEST, FIRST_RATE, FUTILE_PART, ROUNDING, SCALE_LASTS
 from integrators.kernel.step.stopping import rate_since, rate_unseen, takes_too_long, untested
@@ -69,11 +69,12 @@ HELD_BACK = 1.2
 GAIN, GAIN_LIGHT, GAIN_PER_ROW, MOST_ROWS = 3.0, 6.0, 0.1, 64
 LEAST_WORTH = log(GAIN)  # `log_worth` is larger; no logarithm is taken where this tells enough
 MOST_HELD_BACK_STEPS = 4096  # twice as many each time that it has gained nothing
-# A step that is too long may fail, or look like one with a kink; so many in a row have one, and are cut to
-# find it.
+# A step that is too long may fail, or look like one with a discontinuity; so many in a row have one, and are
+# cut to find it.
 SURE = 3
 STAY = 16  # steps for which it then stays
-# Attempts at a step after which its errors do not become small enough by cutting it; at a kink they do.
+# Attempts at a step after which its errors do not become small enough by cutting it; at a discontinuity they
+# do.
 FUTILE = 24
 # From rest, by its own size, a block may follow the steps of the field's rounding: no step fails, and
 # there are many. So what the blocks will reach is asked for now and then where steps are cut to less
@@ -286,7 +287,7 @@ def ready(ctx):
         if accepts(ctx, outcome, ctx.counters.iterations - before, implicit):
             ctx.solved = BY_VALUES
             return DONE
-        if ctx.kinks.undone:
+        if ctx.discontinuities.undone:
             undo(ctx)
             begin_attempts(ctx)
         failure = UNDERFLOW if outcome == DONE else outcome
@@ -315,7 +316,7 @@ def crawls(ctx, h):
 @compiled
 def begin_attempts(ctx):
     """Begin to look for the length of the step ahead."""
-    ctx.controller.rejected = ctx.controller.attempts = ctx.kinks.doubts = 0
+    ctx.controller.rejected = ctx.controller.attempts = ctx.discontinuities.doubts = 0
     ctx.surfaces.locating = ctx.surfaces.reached = 0
 
 
@@ -343,7 +344,7 @@ def accepts(ctx, outcome, iterations, implicit):
             return True
         surfaces.locating = 0
         if surfaces.across != NO_SURFACE:
-            count(ctx, ctx.t0, ctx.h)
+            record(ctx, ctx.t0, ctx.h)
             good = False
     if not good:
         reject(ctx, outcome, factor, implicit)
@@ -354,9 +355,9 @@ def accepts(ctx, outcome, iterations, implicit):
 
 @compiled
 def estimate_attempt(ctx, outcome, implicit):
-    """Return the estimated errors of the attempted step; infinite: it failed, or has a kink that matters."""
-    kinks, surfaces = ctx.kinks, ctx.surfaces
-    kinks.undone = 0
+    """Return the estimated errors of the attempted step; infinite: it failed, or is not smooth."""
+    discontinuities, surfaces = ctx.discontinuities, ctx.surfaces
+    discontinuities.undone = 0
     across = look_across(ctx, outcome) if surfaces.code else NO_SURFACE
     if outcome != DONE:
         return INFINITY, INFINITY
@@ -364,18 +365,18 @@ def estimate_attempt(ctx, outcome, implicit):
     error, defect = estimate_implicit(ctx) if implicit else estimate(ctx)
     fits = is_good(error, ctx.controller.allowed_error, defect, ctx.controller.allowed_defect)
     if implicit:
-        if surfaces.crossed and (kinks.kinked or fits) and kink(ctx, fits):
+        if surfaces.crossed and (discontinuities.not_smooth or fits) and has_discontinuity(ctx, fits):
             error = INFINITY
-        kinks.border_ahead = NOTHING
-        kinks.undone = 0
+        discontinuities.next_boundary = NOTHING
+        discontinuities.undone = 0
     else:
-        if kinks.kinked:
-            kinks.doubts += 1
-            kinks.doubt_end = ctx.t0 + ctx.h
-        if (fits or kinks.doubts >= SURE) and kink(ctx, fits):
+        if discontinuities.not_smooth:
+            discontinuities.doubts += 1
+            discontinuities.doubt_end = ctx.t0 + ctx.h
+        if (fits or discontinuities.doubts >= SURE) and has_discontinuity(ctx, fits):
             error = INFINITY
     if surfaces.count and fits and error < INFINITY and across == NO_SURFACE and grazes(ctx):
-        count(ctx, ctx.t0, ctx.h)
+        record(ctx, ctx.t0, ctx.h)
         error = INFINITY
     return error, defect
 
@@ -398,8 +399,8 @@ def follow(ctx, factor, iterations, implicit):
     h = ctx.h
     if ctx.estimate.rescaled:
         ctx.estimate.rescaled = SCALE_LASTS if ctx.estimate.borrowed else ctx.estimate.rescaled - 1
-    if ctx.kinks.doubts >= SURE and ctx.kinks.count:
-        controller.length_limit = INFINITY  # what the iteration allowed was for the kink
+    if ctx.discontinuities.doubts >= SURE and ctx.discontinuities.count:
+        controller.length_limit = INFINITY  # what the iteration allowed was for the discontinuity
     controller.length_limit = controller.length_limit * APPROACH
     busy = ctx.implicit.busy if implicit else BUSY
     factor = as_iterations_allow(factor, busy, iterations, abs(h), controller.length_limit)
@@ -427,7 +428,7 @@ def again(ctx, outcome, implicit):
 @compiled
 def end_on_surface(ctx, factor, iterations, implicit):
     """Let the attempted step, which ends on a switching surface, be followed by one as long as was wanted."""
-    count(ctx, ctx.t0 + ctx.h, 0.0)
+    record(ctx, ctx.t0 + ctx.h, 0.0)
     follow(ctx, factor, iterations, implicit)
     ctx.surfaces.reached = 1
     wanted = ctx.surfaces.length_wanted
@@ -487,4 +488,4 @@ def arrive_on_surface(ctx):
     if surfaces.reached:
         surfaces.reached = 0
         ctx.length = ctx.controller.length_behind = 0.0
-        ctx.kinks.border = START
+        ctx.discontinuities.boundary = START

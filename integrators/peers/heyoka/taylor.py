@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from integrators.caveats import unseen
+from integrators.caveats import undetected
 from integrators.events.event import Event
 from integrators.options import Share
 from integrators.peers import UNTRACED, load
@@ -106,8 +106,8 @@ class Taylor(MethodBase):
         return None if problem.system.traced else UNTRACED
 
     def caveat(self, problem: Problem) -> str | None:
-        """Name a field that is not smooth: heyoka differentiates ``abs`` as if no step went over its kink."""
-        return unseen(
+        """Name a field that is not smooth: heyoka differentiates ``abs`` as if no step went over 0."""
+        return undetected(
             problem, "a Taylor series on one side of a discontinuity does not describe the other side"
         )
 

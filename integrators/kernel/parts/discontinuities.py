@@ -2,33 +2,34 @@
 
 from integrators.kernel.native.memory import Array, Integer, Part, Real
 
-KINKS_KEPT = 64
+MOST_RECORDED = 64
 
 # What is known of the field where a step ends: NOTHING; the values that its polynomial says, EXTRAPOLATED,
 # which are compared with those of the next; that they are right, SEEN. At a START it may jump.
 START, NOTHING, EXTRAPOLATED, SEEN = range(-1, 3)
 
 
-class Kinks(Part):
-    """Kinks and jumps of the field that steps have met; see `step.kinks`."""
+class Discontinuities(Part):
+    """Discontinuities of the field and of its derivatives that steps have met; see `step.discontinuities`."""
 
     doubts = Integer()  # attempts at the step ahead that were rejected and did not look smooth
     doubt = Real()  # last coefficients that are a smaller part of the low ones fall off well enough
     slowest_decay = Real()  # of a smooth field, from the middle coefficients to the last ones
-    negligible = Real()  # part of a block's size that the error at a kink may be
-    kinked = Integer()  # 1: in the step that was estimated the field does not look smooth
+    negligible = Real()  # part of a block's size that the error at a discontinuity may be
+    not_smooth = Integer()  # 1: in the step that was estimated the field does not look smooth
     count = Integer()  # places where steps were rejected for that
-    places = Array(2, KINKS_KEPT)  # pairs: time and length of the last step rejected at each of them
+    records = Array(2, MOST_RECORDED)  # pairs: time and length of the last step rejected at each of them
     end = Real()  # where the first such step at the last place would have ended
-    doubt_end = Real()  # where the last step would have ended that failed or looked like one with a kink
+    # Where the last step would have ended that failed or looked like one with a discontinuity
+    doubt_end = Real()
     # The field where steps meet, which no node sees. At the end of the step ahead, as its polynomial says,
     # eight partial sums a row; the same of the step behind.
-    borders = Array(8, "padded")
-    borders_behind = Array(8, "padded")
+    boundary_values = Array(8, "padded")
+    previous_boundary_values = Array(8, "padded")
     gaps = Array("rows")  # how far that is from what the polynomial of the step ahead says
     apart = Integer()  # 1: for one of them that is more than for a smooth field
-    lasts = Array("rows")  # the larger of the last two coefficients of a row,
-    lasts_behind = Array("rows")  # and in the step behind
-    border = Integer()  # what is known of the step behind: START, NOTHING, EXTRAPOLATED, SEEN
-    border_ahead = Integer()  # the same of the step ahead
+    last_coefficients = Array("rows")  # the larger of the last two coefficients of a row,
+    previous_last_coefficients = Array("rows")  # and in the step behind
+    boundary = Integer()  # what is known of the step behind: START, NOTHING, EXTRAPOLATED, SEEN
+    next_boundary = Integer()  # the same of the step ahead
     undone = Integer()  # 1: the field jumps before the end of the step behind

@@ -16,7 +16,7 @@ SPLINE = CubicSpline(PLACES, FORCES)
 
 
 def overlap(power):
-    """Return a field, the places at which it has a kink, and the force on q in the i-th interval of those."""
+    """Return a field, where its derivative jumps, and the force on q in the i-th interval of those."""
 
     def field(y, par, m):
         return [y[1], -y[0] - STIFFNESS * m.where(y[0] > par.gap, (y[0] - par.gap) ** power, 0)]
@@ -29,7 +29,7 @@ def overlap(power):
 
 
 def spline(i, q):
-    """Return the force of the spline's pieces; beyond the knots next to the ends it has no kink."""
+    """Return the force of the spline's pieces; beyond the knots next to the ends it has no discontinuity."""
     j = min(i + 1, PLACES.size - 3)
     return -np.polyval(SPLINE.c[:, j], q - PLACES[j])
 
@@ -59,14 +59,14 @@ class Place:
 
 
 def expected(name, start):
-    """Return the state at the end, by a smooth field from one kink to the next."""
-    _, kinks, force = SYSTEMS[name]
-    t, y, i = 0.0, start, int(np.searchsorted(kinks, start[0]))
+    """Return the state at the end, by a smooth field from one discontinuity to the next."""
+    _, discontinuities, force = SYSTEMS[name]
+    t, y, i = 0.0, start, int(np.searchsorted(discontinuities, start[0]))
     while True:
         ends = [
-            Place(kinks[place], direction)
+            Place(discontinuities[place], direction)
             for place, direction in ((i - 1, -1.0), (i, 1.0))
-            if 0 <= place < len(kinks)
+            if 0 <= place < len(discontinuities)
         ]
         piece = solve_ivp(
             lambda t, y, i=i: [y[1], force(i, y[0])], (t, END), y,
