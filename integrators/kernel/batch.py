@@ -122,8 +122,8 @@ class Work:
         self.share(lanes.run, [jobs] * min(self.threads, len(jobs)))
         stayed = lanes.arrived != LEFT
         result.steps[stayed] = lanes.steps[stayed]
-        result.iterations[stayed] = lanes.sweeps[stayed]
-        result.evaluations[stayed] = lanes.lanes.k * lanes.sweeps[stayed]
+        result.iterations[stayed] = lanes.iterations[stayed]
+        result.evaluations[stayed] = lanes.lanes.k * lanes.iterations[stayed]
         self.share(self.alone, np.flatnonzero(~stayed).tolist())
         return result
 
@@ -204,7 +204,7 @@ class _InLanes:
             "starts": work.starts, "all_par": work.parameters,
             "all_velocity": lanes.velocities(work.parameters),
             "times": np.ascontiguousarray(result.t), "out": result.y, **more,
-            "arrived": np.zeros(n, np.int64), "all_sweeps": np.zeros(n, np.int64),
+            "arrived": np.zeros(n, np.int64), "all_iterations": np.zeros(n, np.int64),
         }  # fmt: skip
         lanes_ = cls(lanes, work, h, {"count": result.t.size, "trajectories": n, **counts}, arrays)
         lanes_.spare.append(lanes_.memory())
@@ -239,9 +239,9 @@ class _InLanes:
         return self.arrays["arrived"]
 
     @property
-    def sweeps(self) -> Counts:
-        """Sweeps in which each took part."""
-        return self.arrays["all_sweeps"]
+    def iterations(self) -> Counts:
+        """Iterations in which each took part."""
+        return self.arrays["all_iterations"]
 
     def run(self, jobs: deque[range]) -> None:
         """Integrate trajectories by the jobs that are left, which other threads take from too."""

@@ -58,7 +58,7 @@ PARTIAL, STOP, DENSE = range(3)
 # What solves the step ahead, if anything does: the values, or increments that the implicit solver has found.
 UNSOLVED, BY_VALUES, BY_INCREMENT = range(3)
 
-# What whole sweeps do after the last one, if anything; see `Context.fused`.
+# What whole iterations do after the last one, if anything; see `Context.fused`.
 MEASURE, EVALUATE = 1, 2
 
 # What a line integral does; see `Context.line`.
@@ -84,7 +84,7 @@ class Shape:
     field : int
         Address of the vector field.
     fused : int
-        Address of whole sweeps; 0: none.
+        Address of whole iterations; 0: none.
     parameters : int
         Length of the parameter vector.
     block, group : ndarray of int
@@ -134,7 +134,7 @@ class Context(Memory):
 
     # --- what is integrated, and how ---
     field = Integer()  # address of void(times, stages, par, values) on one block of stages
-    fused = Integer()  # address of whole sweeps, void(context, count, after); 0: none, see `step.fused`
+    fused = Integer()  # address of whole iterations, void(context, count, after); 0: none, see `step.fused`
     # address of a line integral, int64(what, context); 0: plain. It makes the VALUES at the stages from the
     # field, the state at a step's END, and learns of every new state at which the trajectory has ARRIVEd.
     line = Integer()

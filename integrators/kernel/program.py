@@ -158,7 +158,7 @@ class HBVMProgram(Compiled):
         nothing = np.empty(0)
         self._known_velocity = b"?", (nothing, nothing, nothing)
         unit = tables.unit(self.constants, self._velocity_scale(np.full(system.n_par, np.nan)))
-        self.fused = self._sweeps(quantity, rows, lanes) if unit and not self.kept else None
+        self.fused = self._iterations(quantity, rows, lanes) if unit and not self.kept else None
         self.shape = Shape(
             rows, self.second, unit, self.field.address, self.fused.address if self.fused else 0,
             system.n_par, block, group, self.constants,
@@ -178,11 +178,11 @@ class HBVMProgram(Compiled):
             self.implicit()
         self.compile_seconds = binary.clock() - started
 
-    def _sweeps(self, quantity: emit.Quantity, rows: int, lanes: int) -> binary.Native | None:
-        """Return whole sweeps for a system with a few rows, if they can be compiled with its field."""
+    def _iterations(self, quantity: emit.Quantity, rows: int, lanes: int) -> binary.Native | None:
+        """Return whole iterations for a system with a few rows, if they can be compiled with its field."""
         if rows > fused.ROWS or self.constants.route not in (8, 16) or not self.lanes:
             return None
-        return fused.compile_sweeps(self.system, quantity, lanes, rows)
+        return fused.compile_iterations(self.system, quantity, lanes, rows)
 
     @property
     def description(self) -> str:

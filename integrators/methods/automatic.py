@@ -174,8 +174,8 @@ class Work:
             return k * (iterations * stage + ROW * self.rows / NARROW)
         vectors = k // NARROW
         product = PRODUCT * self.rows * k * vectors
-        sweep = ITERATION + OPERATION * self.field * vectors + product
-        return STEP + ROW * self.rows * vectors + iterations * sweep
+        iteration = ITERATION + OPERATION * self.field * vectors + product
+        return STEP + ROW * self.rows * vectors + iterations * iteration
 
 
 def choose(system: System, tol: float, *, lanes: bool = False) -> tuple[int, int, float | None]:

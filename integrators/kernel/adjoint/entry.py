@@ -21,10 +21,10 @@ from integrators.kernel.simd.memory import call_field, get, put
 from integrators.kernel.simd.operations import two_sum
 from integrators.kernel.step.begin import choose, prepare, rewind, set_step
 from integrators.kernel.step.finish import commit, finish
+from integrators.kernel.step.fixed_point import iterate_measured
 from integrators.kernel.step.iterate import settle, test
 from integrators.kernel.step.sample import write
 from integrators.kernel.step.sums import time_of_step
-from integrators.kernel.step.sweep import sweep_measured
 
 context, tape_at, pullback = view(Context), view(Tape), view(Pullback)
 
@@ -92,7 +92,7 @@ def pull(address, place):
         rewind(ctx)
         prepare(ctx)
         choose(ctx)
-        test(ctx, sweep_measured(ctx, ctx.solver.free if ctx.solver.predicted else 0))
+        test(ctx, iterate_measured(ctx, ctx.solver.free if ctx.solver.predicted else 0))
         outcome = settle(ctx)
         if outcome == DONE:
             outcome = finish(ctx)

@@ -229,7 +229,7 @@ class Control:
             log_ratio(self.h / self.row("length_behind").absolute()),
         )
         self.limit = self.row("length_limit") * APPROACH
-        iterations = Value(b, b.load(w.sweeps)) - self.row("before")
+        iterations = Value(b, b.load(w.iterations)) - self.row("before")
         self.factor = as_iterations_allow(
             bounded(factor, GROW), self.number("busy"), iterations, self.h, self.limit
         )
@@ -269,7 +269,7 @@ class Control:
         news = {
             "t0": t, "time_low": low, "error_behind": self.error, "defect_behind": self.defect,
             "length_behind": w.h, "length_limit": self.limit, "h": length, "ratio": self.factor,
-            "begin": w.unity, "before": Value(b, b.load(w.sweeps)), "since": since,
+            "begin": w.unity, "before": Value(b, b.load(w.iterations)), "since": since,
         }  # fmt: skip
         for name, value in news.items():
             w.put(value.where(good, self.row(name)), w.array(slots[name]))

@@ -42,7 +42,7 @@ class Group(Memory):
     error = Array("dim", "lanes")  # what `state` lacks
     alive = Array("lanes")  # 1: goes on; 0: left, because its equations were not solved
     living = Integer()  # whether any is alive
-    sweeps = Array("lanes")  # in which the trajectory took part
+    iterations = Array("lanes")  # in which the trajectory took part
     rate = Array("lanes")  # binary logarithm of the iteration's contraction, as measured
 
     # --- a step ---
@@ -85,7 +85,7 @@ class Group(Memory):
     next_last_coefficients = Array("rows", "lanes")
     gaps = Array("rows", "lanes")  # between blocks of the field as two steps have it where they meet
     longest = Real()  # no step is longer
-    busy = Real()  # sweeps to aim at, at most
+    busy = Real()  # iterations to aim at, at most
     worth = Real()  # how much longer steps the errors must allow for the implicit solver (logarithm)
     length_behind = Array("lanes")
     error_behind = Array("lanes")
@@ -110,7 +110,7 @@ class Group(Memory):
     part_reach = Array()  # and `reach`
     out = Array()  # (n, samples, dim)
     arrived = Array(kind=int)  # (n): LEFT, ARRIVED, ...
-    all_sweeps = Array(kind=int)  # (n)
+    all_iterations = Array(kind=int)  # (n)
     trajectories = Integer()  # n
     at = Integer()  # first trajectory of the group,
     end = Integer()  # and the one after the last to be done
@@ -123,7 +123,7 @@ class Group(Memory):
     first_length = Real()  # of the first step; 0: what the field there suggests
     member = Array("lanes", kind=int)  # which trajectory is on a lane; -1: none
     samples_written = Array("lanes", kind=int)  # its samples
-    before = Array("lanes")  # its sweeps before the present step
+    before = Array("lanes")  # its iterations before the present step
     mark = Array("lanes")  # the time at which it was last seen to get anywhere
     all_steps = Array(kind=int)  # (n)
 

@@ -31,7 +31,7 @@ def unload(group, lane, how):
     """Take the trajectory from a lane."""
     i = group.member[lane]
     group.arrived[i] = how
-    group.all_sweeps[i] = int(group.sweeps[lane])
+    group.all_iterations[i] = int(group.iterations[lane])
     group.all_steps[i] = context_at(group.contexts[lane]).counters.steps
     group.member[lane] = -1
 

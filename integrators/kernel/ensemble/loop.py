@@ -24,7 +24,7 @@ def load(group):
         for d in range(rows):
             group.velocity[lanes * d + lane] = group.all_velocity[rows * i + d]
         group.alive[lane] = 1.0
-        group.sweeps[lane], group.rate[lane] = 0.0, FIRST_RATE
+        group.iterations[lane], group.rate[lane] = 0.0, FIRST_RATE
     for i in range(group.k * rows * lanes):
         group.values[i] = 0.0
     group.n = group.sample = 0
@@ -36,7 +36,7 @@ def unload(group):
     """Keep how the trajectories of the group ended, and go on to the next."""
     for lane in range(min(group.lanes, group.trajectories - group.at)):
         group.arrived[group.at + lane] = 1 if group.alive[lane] == 1.0 else 0
-        group.all_sweeps[group.at + lane] = int(group.sweeps[lane])
+        group.all_iterations[group.at + lane] = int(group.iterations[lane])
     group.at += group.lanes
     group.sample = -1
 
@@ -72,7 +72,7 @@ def part_step(group, side, sample):
             group.t0[lane], group.time_low[lane], float(group.n), group.h[lane]
         )
         side.h[lane] = part
-        side.alive[lane], side.sweeps[lane] = group.alive[lane], 0.0
+        side.alive[lane], side.iterations[lane] = group.alive[lane], 0.0
         side.rate[lane] = group.rate[lane]  # not that of another partial step
     side.n = 0
     length = group.part_places[sample]
@@ -84,7 +84,7 @@ def part_step(group, side, sample):
     group.living = side.living
     for lane in range(lanes):
         group.alive[lane] = side.alive[lane]
-        group.sweeps[lane] += side.sweeps[lane]
+        group.iterations[lane] += side.iterations[lane]
 
 
 @compiled

@@ -72,7 +72,7 @@ def load(group, lane):
     if group.times[group.count - 1] < group.start_time:
         ctx.controller.next_length = -ctx.controller.next_length
     clear(group, lane)
-    group.sweeps[lane], group.rate[lane] = 0.0, FIRST_RATE
+    group.iterations[lane], group.rate[lane] = 0.0, FIRST_RATE
     group.mark[lane] = group.start_time
     group.samples_written[lane] = 0
     if group.events and not look_at_start(group, lane, ctx):
@@ -92,7 +92,7 @@ def aim(group, lane):
     # Where the step begins and how long it is on the one whose values are there; 0: on none.
     group.ratio[lane] = h / length if is_within_reach(h, length) else 0.0
     group.begin[lane] = 0.0 if ctx.controller.rejected else 1.0
-    group.before[lane] = group.sweeps[lane]
+    group.before[lane] = group.iterations[lane]
     group.alive[lane] = 1.0
     group.length_behind[lane], group.length_limit[lane] = (
         ctx.controller.length_behind,
@@ -159,7 +159,7 @@ def settle(group, lane):
             ctx.scratch.row_state[d] = group.state[group.lanes * d + lane]
     else:
         clear(group, lane)
-    if accepts(ctx, outcome, int(group.sweeps[lane] - group.before[lane]), 0):
+    if accepts(ctx, outcome, int(group.iterations[lane] - group.before[lane]), 0):
         if group.events == 0 or watch(group, lane, ctx):
             step(group, lane, ctx)
         leave_if_slow(group, lane, ctx)

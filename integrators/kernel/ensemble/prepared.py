@@ -23,7 +23,7 @@ from problems.trace.graph import reachable
 LANES = 8  # of a register of AVX-512
 SOON = ("const", "symbol", "index", "add", "sub", "mul", "neg", "pow", "sum")  # operations not waited for
 STAGES = 16  # at most: their sums are written out
-UNROLLED = 640  # products of a sweep that are written out, at most
+UNROLLED = 640  # products of an iteration that are written out, at most
 FEW_ROWS, FEW_CALLS = 4, 3  # where both are exceeded, no products are written out
 ROOM = 4096  # rows of all stages, at most: beyond, a group of trajectories does not fit in the nearest caches
 
@@ -220,7 +220,7 @@ def compiled_lanes(make: Callable[[], Made]) -> tuple[Made | None, float]:
 def _reach(matrix: Numbers) -> Numbers:
     """Return how far a change of the values moves the stages at most, for a matrix or for several.
 
-    In the next sweep a stage meets the changes at itself and at those after it: the others have moved it.
+    In the next iteration a stage meets the changes at itself and at those after it: the others have moved it.
     """
     return np.abs(np.triu(matrix)).sum(axis=-1).max(axis=-1)
 

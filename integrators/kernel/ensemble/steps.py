@@ -2,7 +2,7 @@
 
 Every number of a step is a vector, with one trajectory in each lane, so that there is nothing to shuffle and
 no sum over lanes. Stages come one after another; each uses the values that the field has had at the stages
-before it in the same sweep (Gauss and Seidel). The arithmetic is that of `integrators.kernel.step`:
+before it in the same iteration (Gauss and Seidel). The arithmetic is that of `integrators.kernel.step`:
 nodes, weights and the state are sums of two doubles, and what is at the size of the state is added last.
 
 A trajectory whose iteration has ended keeps its values while the others iterate on: what happens
@@ -61,7 +61,7 @@ class Form:
     groups : tuple of tuple of int
         First row, number of blocks and rows of a block, of groups of blocks (positions, momenta).
     vectors : tuple of tuple of int
-        The same of tangent vectors, which may begin at 0: they are measured after each sweep.
+        The same of tangent vectors, which may begin at 0: they are measured after each iteration.
     """
 
     lanes: int
@@ -165,8 +165,9 @@ class Steps(Writer):
             self.each(k * rows, lambda i: self.put(self.get(kept, i), self.values, i))
         alive = self.get(self.array(slots["alive"]))
         self.alive = self.variable(self.bits, alive.compare("!=", 0.0))
-        self.sweeps, self.rate = (
-            self.variable(self.kind, self.get(self.array(slots[name])).value) for name in ("sweeps", "rate")
+        self.iterations, self.rate = (
+            self.variable(self.kind, self.get(self.array(slots[name])).value)
+            for name in ("iterations", "rate")
         )
         taken = self.variable(INTEGER, ir.Constant(INTEGER, 0))
         loop, end = self.function.append_basic_block("step"), self.function.append_basic_block("done")
@@ -182,7 +183,7 @@ class Steps(Writer):
         if self.held:
             self.each(k * rows, lambda i: self.put(self.get(self.values, i), kept, i))
         self.put(self.unity.where(b.load(self.alive), 0.0), self.array(slots["alive"]))
-        for variable, name in ((self.sweeps, "sweeps"), (self.rate, "rate")):
+        for variable, name in ((self.iterations, "iterations"), (self.rate, "rate")):
             self.put(Value(b, b.load(variable)), self.array(slots[name]))
         b.store(b.zext(self.any(b.load(self.alive)), INTEGER), self.word(slots["living"]))
         b.ret_void()
@@ -386,25 +387,26 @@ class Steps(Writer):
         self.each(k, stage)
 
     def iterate(self) -> None:
-        """Sweep until every lane is solved, or has left."""
+        """Iterate until every lane is solved, or has left."""
         b, form = self.b, self.form
         infinite = self.zero.constant(INFINITY).value
         none = ir.Constant(self.bits, [0] * form.lanes)
         self.last, self.best = self.variable(self.kind, infinite), self.variable(self.kind, infinite)
         self.stalled = self.variable(self.kind, self.zero.value)
-        self.left = self.variable(self.kind, infinite)  # sweeps still to be made; infinite: that is not known
+        # Iterations still to be made; infinite: that is not known
+        self.left = self.variable(self.kind, infinite)
         self.again = self.variable(self.bits, none)
         self.active = self.variable(self.bits, b.load(self.alive))
         self.tried = self.variable(INTEGER, ir.Constant(INTEGER, 0))
-        loop, end = self.function.append_basic_block("sweep"), self.function.append_basic_block("solved")
+        loop, end = self.function.append_basic_block("iteration"), self.function.append_basic_block("solved")
         b.branch(loop)
         b.position_at_end(loop)
-        self.sweep()
+        self.iteration()
         self.rule()
         b.cbranch(self.any(b.load(self.active)), loop, end)
         b.position_at_end(end)
 
-    def sweep(self) -> None:
+    def iteration(self) -> None:
         """Set new values at all stages, one after another, and how much they have changed."""
         b, form = self.b, self.form
         k, rows = form.k, form.rows
@@ -448,18 +450,18 @@ class Steps(Writer):
         self.each(k, stage)
 
     def rule(self) -> None:
-        """Count a sweep, and apply the stopping rule, in every lane by itself.
+        """Count an iteration, and apply the stopping rule, in every lane by itself.
 
-        A lane is not judged any more once it is known how many sweeps are left. Where that is known of all,
-        the end of the iteration need not wait for the rule.
+        A lane is not judged any more once it is known how many iterations are left. Where that is known of
+        all, the end of the iteration need not wait for the rule.
         """
         b, form = self.b, self.form
         if form.vectors:
             self.sizes_of_vectors()
         tried = b.add(b.load(self.tried), ir.Constant(INTEGER, 1))
         b.store(tried, self.tried)
-        active, sweeps, left = b.load(self.active), self.load(self.sweeps), self.load(self.left) - 1.0
-        b.store((sweeps + 1.0).where(active, sweeps).value, self.sweeps)
+        active, iterations, left = b.load(self.active), self.load(self.iterations), self.load(self.left) - 1.0
+        b.store((iterations + 1.0).where(active, iterations).value, self.iterations)
         b.store(left.value, self.left)
         undecided = b.and_(active, left.compare(">=", INFINITY))
         with b.if_then(self.any(undecided)):
@@ -467,9 +469,9 @@ class Steps(Writer):
         b.store(b.and_(b.load(self.active), self.load(self.left).compare(">", 0.0)), self.active)
 
     def judge(self, undecided: Any, tried: Any) -> None:
-        """Let lanes know how many sweeps are left, where that has become known, and end those that fail.
+        """Let lanes know how many iterations are left, where that has become known, and end those that fail.
 
-        What is judged is the change that the next sweep would make of the stages, beside
+        What is judged is the change that the next iteration would make of the stages, beside
         their block: bounded by that of the values.
         """
         from integrators.kernel.step.stopping import further, judge, left_over, stagnates  # imports numba
@@ -556,7 +558,7 @@ class Steps(Writer):
             return half(d, high, low, range(middle)).two_sum(half(d, high, low, range(middle, form.k)))
 
         def keep(d: Index, new: Value, lost: Value) -> None:
-            # The last sweeps are not judged: in one component of a lane they may have left no number.
+            # The last iterations are not judged: in one component of a lane they may have left no number.
             good = b.and_(b.load(self.alive), (new - new).compare("==", 0.0))
             b.store(good, self.alive)
             for value, base, now in ((new, *ends[0]), (lost, *ends[1])):

@@ -212,7 +212,7 @@ def act(group, lane, ctx, search):
         controller.length_after = wanted  # it was to end at a sample: what comes after need not be as short
     iterations = ctx.counters.iterations
     outcome = call_step(search, ACT)
-    group.sweeps[lane] += float(ctx.counters.iterations - iterations)
+    group.iterations[lane] += float(ctx.counters.iterations - iterations)
     if outcome == RENEW and group.renews:
         renew(group, lane, ctx, search)
         outcome = DONE

@@ -48,7 +48,7 @@ class Writer:
         return self.b.inttoptr(self.b.load(self.word(slot)), DOUBLE.as_pointer())
 
     def table(self, slot: Slot) -> Any:
-        """Return the address in a slot, whose numbers are loaded anew in every sweep: registers are few."""
+        """Return the address in a slot; its numbers are loaded anew in every iteration: registers are few."""
         address = self.b.load_atomic(self.word(slot), "monotonic", 8)
         return self.b.inttoptr(address, DOUBLE.as_pointer())
 

@@ -26,8 +26,8 @@ from integrators.kernel.implicit.linear import eliminate
 from integrators.kernel.implicit.stages import at, project, set_velocities
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.memory import get, put, splat8
+from integrators.kernel.step.fixed_point import evaluate, multiply
 from integrators.kernel.step.stages import offset
-from integrators.kernel.step.sweep import evaluate, multiply
 
 # Which Jacobian a correction takes: the one at hand, one at the mean of the stages, one at each stage.
 KEPT, MEAN, EACH = range(3)

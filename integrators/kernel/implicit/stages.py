@@ -14,9 +14,9 @@ from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.lanes import fma
 from integrators.kernel.simd.memory import get, larger, largest, put, splat8, spread
 from integrators.kernel.simd.views import doubles
+from integrators.kernel.step.fixed_point import multiply
 from integrators.kernel.step.size import change, enter_size, forget_sizes, invert_sizes, stage_size
 from integrators.kernel.step.stages import offset
-from integrators.kernel.step.sweep import multiply
 
 workspace = view(Workspace)
 STRICT, FLOORED = range(2)  # relative to a block, and relative to a block that is raised if it is small

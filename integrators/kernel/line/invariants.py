@@ -21,8 +21,8 @@ then vanish exactly, and a fixed-order factorization leaves them so.
 
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.memory import call_field, get, larger, largest, put, splat8, spread, total
+from integrators.kernel.step.fixed_point import multiply
 from integrators.kernel.step.stages import offset, place
-from integrators.kernel.step.sweep import multiply
 
 DEPENDENT = 1e-10  # a pivot this small, relative to its row, is none
 REGULAR = 1e-6  # rounding is taken back along these directions only

@@ -2,8 +2,8 @@
 
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.memory import get, put, splat8
+from integrators.kernel.step.fixed_point import multiply
 from integrators.kernel.step.stages import offset, place
-from integrators.kernel.step.sweep import multiply
 
 
 @compiled

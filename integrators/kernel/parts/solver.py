@@ -14,7 +14,7 @@ class Solver(Part):
     stalled = Integer()
     best = Real()  # the smallest change
     last = Real()  # change; see `step.iterate`
-    change = Real()  # the largest of the last fused sweep
+    change = Real()  # the largest of the last fused iteration
     rate = Real()  # binary logarithm of the iteration's contraction, as measured
     tolerance = Real()  # the relative change at which the iteration has converged
     trusted = Real()  # a change from which on adaptive steps iterate without a test,

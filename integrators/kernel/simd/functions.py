@@ -11,7 +11,7 @@ way; any other one adds to the exponent of a number about 1 (Morse's oscillator 
 lanes: 8 to 10 % less time, a Toda lattice: 24 %).
 
 A sine of eight lanes takes 4 ns, where eight of the C library take 45 ns: a
-pendulum's sweep over eight stages 28 ns instead of 70, a double pendulum's 44
+pendulum's iteration over eight stages 28 ns instead of 70, a double pendulum's 44
 instead of 226.
 """
 

@@ -239,8 +239,8 @@ def _caller(arguments: int, returns: Any = types.void) -> Any:
 
 call_field = _caller(4)
 """``call_field(field, times, stages, par, values)``: the vector field, on one block of stages."""
-call_sweeps = _caller(3)
-"""``call_sweeps(fused, ctx, count, after)``: see `integrators.kernel.step.fused`."""
+call_iterations = _caller(3)
+"""``call_iterations(fused, ctx, count, after)``: see `integrators.kernel.step.fused`."""
 call_solver = _caller(3, types.int64)
 """``call_solver(solver, ctx, memory, started)``: the implicit solver."""
 call_line = _caller(2, types.int64)

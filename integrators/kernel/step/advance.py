@@ -3,7 +3,7 @@
     gamma_j = sum_l b_l P_j(c_l) f(t + c_l h, Y_l),    Y_l = y + h sum_j gamma_j int_0^{c_l} P_j,
     y_1     = y + h gamma_0:
 
-first stages from the polynomial of the step before; sweeps, each of which evaluates the field
+first stages from the polynomial of the step before; iterations, each of which evaluates the field
 at the stages and makes new ones of its values; a test of how much they still change; the state
 at the end, with what rounding took from it.
 """
@@ -13,9 +13,9 @@ from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.memory import call_follow, call_look
 from integrators.kernel.step.begin import begin
 from integrators.kernel.step.finish import commit, finish
+from integrators.kernel.step.fixed_point import iterate_measured
 from integrators.kernel.step.handover import reconsider, solve_implicitly
 from integrators.kernel.step.iterate import settle, test
-from integrators.kernel.step.sweep import sweep_measured
 
 
 @compiled
@@ -26,7 +26,7 @@ def solve(ctx):
     if ctx.implicit.active:
         return solve_implicitly(ctx, ctx, 0)
     begin(ctx)
-    test(ctx, sweep_measured(ctx, ctx.solver.free if ctx.solver.predicted else 0))
+    test(ctx, iterate_measured(ctx, ctx.solver.free if ctx.solver.predicted else 0))
     return reconsider(ctx, settle(ctx))
 
 

@@ -10,11 +10,18 @@ from integrators.kernel.native.jit import compiled, for_both_widths
 from integrators.kernel.simd.lanes import fma
 from integrators.kernel.simd.memory import get, put, put_lower, put_upper, splat8, spread
 from integrators.kernel.simd.operations import binary_log
+from integrators.kernel.step.fixed_point import (
+    multiply,
+    product,
+    product_for_one,
+    product_of_two,
+    project,
+    through,
+)
 from integrators.kernel.step.rule import FARTHEST
 from integrators.kernel.step.size import take_sizes
 from integrators.kernel.step.stages import offset
 from integrators.kernel.step.sums import multiplied, part_of_drift, time_of_step
-from integrators.kernel.step.sweep import multiply, product, product_for_one, product_of_two, project, through
 from integrators.kernel.tables import PER_OCTAVE, THROUGH
 
 INFINITY = float("inf")

@@ -22,9 +22,9 @@ from integrators.kernel.simd.memory import get, put, splat8, sums, total
 from integrators.kernel.simd.operations import greatest, least, size, where
 from integrators.kernel.step.begin import prepare, set_step, start_plain
 from integrators.kernel.step.control import INFINITY, TINY
+from integrators.kernel.step.fixed_point import evaluate
 from integrators.kernel.step.rule import FIRST_AT_REST, NOTHING, RESTART, SMALLEST
 from integrators.kernel.step.stages import offset
-from integrators.kernel.step.sweep import evaluate
 
 UNSEEN = 1e-13  # part of a block that rounding accounts for in a step that the fixed-point iteration solves
 SLIGHT = 1e-3  # part of the error allowed that a discontinuity counts as where it is negligible

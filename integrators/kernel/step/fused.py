@@ -1,11 +1,11 @@
-"""Whole sweeps of the fixed-point iteration for systems with a few rows, around the traced field.
+"""Whole fixed-point iterations for systems with a few rows, around the traced field.
 
-In a small system a sweep waits for its own results: the stages are stored and loaded
+In a small system an iteration waits for its own results: the stages are stored and loaded
 by the field, its values are stored and loaded by the product. Compiled together, one
-after another, sweeps keep stages and values in registers, as far as there are enough: the sums of three
+after another, iterations keep stages and values in registers, as far as there are enough: the sums of three
 rows of sixteen stages would take 48 registers of AVX2, which has 16, and are made one after another. The
-operations and the order of each sum are those of `sweep.evaluate`, `sweep.product8` and `sweep.product16`,
-hence the bits are (``tests/integrators/kernel/step/test_fused.py``).
+operations and the order of each sum are those of `fixed_point.evaluate`, `fixed_point.product8` and
+`fixed_point.product16`, hence the bits are (``tests/integrators/kernel/step/test_fused.py``).
 """
 
 from typing import Any
@@ -31,18 +31,18 @@ from integrators.kernel.simd.emit import (
 from problems import emit
 from problems.systems.base import System
 
-SWEEP = ir.FunctionType(ir.VoidType(), [INTEGER] * 3)
+ITERATIONS = ir.FunctionType(ir.VoidType(), [INTEGER] * 3)
 
 
 ROWS = 4
-"""Components of a stage up to which whole sweeps are compiled with the field."""
+"""Components of a stage up to which whole iterations are compiled with the field."""
 
 
-def compile_sweeps(system: System, quantity: emit.Quantity, lanes: int, rows: int) -> binary.Native:
+def compile_iterations(system: System, quantity: emit.Quantity, lanes: int, rows: int) -> binary.Native:
     """Compile ``void(context, count, after)``, or load it: for a field on lanes, and factors in the matrix.
 
-    It does ``count`` sweeps. With ``after`` = `MEASURE`, for one sweep or more, `Scratch.old_stages` then
-    holds the stages before the last one, and `Solver.change` the largest change relative to the size of
+    It does ``count`` iterations. With ``after`` = `MEASURE`, for one iteration or more, `Scratch.old_stages`
+    then holds the stages before the last one, and `Solver.change` the largest change relative to the size of
     its block; with `EVALUATE`, the field's values are then those at the newest stages.
 
     Parameters
@@ -55,19 +55,19 @@ def compile_sweeps(system: System, quantity: emit.Quantity, lanes: int, rows: in
     source = emit.source(system, quantity, "numba")
     modules = binary.sources(*field.SOURCES, "parts", "context", "step/fused")
     by_columns = lanes == WIDTH or machine.many_registers()
-    name = store.key("sweeps", source.text, str(lanes), str(rows), str(by_columns), modules)
+    name = store.key("iterations", source.text, str(lanes), str(rows), str(by_columns), modules)
 
     def make() -> tuple[str, bytes]:
         function, arguments = field.on_lanes(emit.numba(system, quantity).py_func, lanes)
         return field.ON_LANES, binary.build(
-            function, arguments, around=lambda inner: sweeps(inner, lanes, rows, by_columns)
+            function, arguments, around=lambda inner: iterations(inner, lanes, rows, by_columns)
         )
 
     return binary.obtain(name, make)
 
 
-def sweeps(inner: str, lanes: int, rows: int, by_columns: bool) -> str:
-    """Return LLVM's text of what `compile_sweeps` promises, around the compiled field ``inner``.
+def iterations(inner: str, lanes: int, rows: int, by_columns: bool) -> str:
+    """Return LLVM's text of what `compile_iterations` promises, around the compiled field ``inner``.
 
     ``by_columns``: products go through the matrix once, with the sums of all rows in registers; else eight
     stages of a row after another, with their values in memory.
@@ -79,9 +79,9 @@ def sweeps(inner: str, lanes: int, rows: int, by_columns: bool) -> str:
         ir.IntType(32), [pointer.as_pointer(), pointer.as_pointer(), whole, pointer, pointer, pointer]
     )
     field = ir.Function(module, status, inner)
-    sweep = ir.Function(module, SWEEP, machine.ENTRY)
-    context, count, after = sweep.args
-    b: Any = ir.IRBuilder(sweep.append_basic_block("start"))
+    function = ir.Function(module, ITERATIONS, machine.ENTRY)
+    context, count, after = function.args
+    b: Any = ir.IRBuilder(function.append_basic_block("start"))
     words = b.inttoptr(context, INTEGER.as_pointer())
 
     def number(value: int) -> Any:
@@ -127,7 +127,7 @@ def sweeps(inner: str, lanes: int, rows: int, by_columns: bool) -> str:
     evaluates = b.icmp_signed("==", after, number(EVALUATE))
     entry, loop, product, end, evaluated = (
         b.block,
-        *(sweep.append_basic_block(name) for name in ("loop", "product", "end", "evaluated")),
+        *(function.append_basic_block(name) for name in ("loop", "product", "end", "evaluated")),
     )
     b.branch(loop)
 
@@ -157,7 +157,7 @@ def sweeps(inner: str, lanes: int, rows: int, by_columns: bool) -> str:
 
     def eight_by_eight() -> list[Any]:
         """Return the stages, made in a loop that has nothing but their sum in registers."""
-        inside, done = (sweep.append_basic_block(name) for name in ("eight", "done"))
+        inside, done = (function.append_basic_block(name) for name in ("eight", "done"))
         before = b.block
         b.branch(inside)
         b.position_at_end(inside)

@@ -3,15 +3,15 @@
 from integrators.kernel.context import BY_VALUES, DIVERGED, DONE, NOT_FINITE, RUNNING
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.step.begin import INFINITY, rewind, start_plain
+from integrators.kernel.step.fixed_point import iterate_and_evaluate, iterate_measured
 from integrators.kernel.step.rule import MOST_ITERATIONS
 from integrators.kernel.step.size import SIZES_LAST, change, take_sizes
 from integrators.kernel.step.stopping import further, judge, left_over, stagnates, untested_next
-from integrators.kernel.step.sweep import sweep_measured, sweep_to_the_end
 
 
 @compiled
 def test(ctx, moved):
-    """Apply the stopping rule to the change of the last sweep; `Solver.outcome` says what came of it."""
+    """Apply the stopping rule to the change of the last iteration; `Solver.outcome` says what came of it."""
     solver, blocks = ctx.solver, ctx.blocks
     last, solver.last = solver.last, moved
     solver.tests += 1
@@ -52,7 +52,7 @@ def extra_iterations(ctx, change):
     stages that they were taken at.
     """
     solver = ctx.solver
-    sweep_to_the_end(ctx, int(further(change, solver.rate, solver.log_rest)))
+    iterate_and_evaluate(ctx, int(further(change, solver.rate, solver.log_rest)))
     solver.outcome = DONE
 
 
@@ -60,7 +60,7 @@ def extra_iterations(ctx, change):
 def settle(ctx):
     """Iterate with tests until the step is solved or has failed; return the outcome."""
     while ctx.solver.outcome == RUNNING:
-        test(ctx, sweep_measured(ctx, 0))
+        test(ctx, iterate_measured(ctx, 0))
     return close(ctx)
 
 

@@ -30,8 +30,8 @@ FALL = 1e15
 # stages before the last change, let the energy leak 7e-20 per step (Gauss(8), h = 1 year): in 1e6 years more
 # than rounding adds; with 1e-18 nothing is seen of it. But with 1e-18 an oscillator's energy falls by 2.1e-19
 # of itself in each step of length 0.5 (HBVM(8, 4), 48 starts, +- 0.1e-19); with 3e-19 it rises by 0.3e-19,
-# for a sweep in thirty more, and with 1e-19 nothing is seen, for one in twelve.
-# Adaptive steps are longer and fewer. With 3e-17 they take a sweep in ten less than with 1e-18, and
+# for one iteration in thirty more, and with 1e-19 nothing is seen, for one in twelve.
+# Adaptive steps are longer and fewer. With 3e-17 they take one iteration in ten less than with 1e-18, and
 # the energy of 48 outer Solar Systems moves as little in 3e4 steps (rms 4.3e-14 and 4.1e-14), as that of
 # Kepler's and Henon and Heiles' problems does in 1e5 to 3e5. With 3e-16 these lose 1e-18 in each step, with
 # 3e-15 3 to 8e-18. At loose tolerances it is seen: a pendulum's energy grows by 2.3e-18 in each step of

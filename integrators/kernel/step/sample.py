@@ -8,10 +8,10 @@ from integrators.kernel.step.begin import predict, prepare, rewind, set_step
 from integrators.kernel.step.discontinuities import keep_end_of_part
 from integrators.kernel.step.estimate import ALIKE
 from integrators.kernel.step.finish import arrive, finish
+from integrators.kernel.step.fixed_point import project
 from integrators.kernel.step.handover import settle_part
 from integrators.kernel.step.size import take_sizes
 from integrators.kernel.step.sums import time_of_step
-from integrators.kernel.step.sweep import project
 
 
 @compiled

@@ -44,6 +44,7 @@ from integrators.kernel.step.control import (
 from integrators.kernel.step.discontinuities import has_discontinuity, keep_end, record, undo
 from integrators.kernel.step.estimate import estimate, estimate_implicit, log_decay
 from integrators.kernel.step.finish import count_step, finish
+from integrators.kernel.step.fixed_point import iterate_measured
 from integrators.kernel.step.graze import grazes
 from integrators.kernel.step.handover import solve_implicitly, want_solver
 from integrators.kernel.step.iterate import close, extra_iterations, settle, test
@@ -52,7 +53,6 @@ from integrators.kernel.step.rule import FARTHEST, FIRST_RATE, FUTILE_PART, ROUN
 from integrators.kernel.step.stopping import rate_since, rate_unseen, takes_too_long, untested
 from integrators.kernel.step.sums import time_after
 from integrators.kernel.step.surfaces import AGAIN, REACHED, leave, locate, look_across
-from integrators.kernel.step.sweep import sweep_measured
 
 GROW = FARTHEST  # of the length from one step to the next, at most
 # Iterations to aim at, at most. With contractions (h w)^2 a unit of time costs least at h w = 1/e, which
@@ -61,9 +61,9 @@ GROW = FARTHEST  # of the length from one step to the next, at most
 # with three times the error; 36 err by 1e-14 in one step of a diffusion.
 BUSY = 18.0
 # The implicit solver takes over after so many steps in a row that the iteration keeps from growing where the
-# errors would allow so much longer ones. Its steps cost one or two of 18 sweeps through memory, and ten of
-# those of few rows or of the second-order form; the more rows, the more. Beyond MOST_ROWS they are too dear
-# to be tried where only low coefficients tell how much longer.
+# errors would allow so much longer ones. Its steps cost one or two of 18 iterations through memory, and ten
+# of those of few rows or of the second-order form; the more rows, the more. Beyond MOST_ROWS they are too
+# dear to be tried where only low coefficients tell how much longer.
 HELD_BACK_STEPS = 8
 HELD_BACK = 1.2
 GAIN, GAIN_LIGHT, GAIN_PER_ROW, MOST_ROWS = 3.0, 6.0, 0.1, 64
@@ -105,7 +105,7 @@ def iterate(ctx):
     iterations need no test; how many remain then, the rate of this step.
     """
     solver = ctx.solver
-    test(ctx, sweep_measured(ctx, 0))
+    test(ctx, iterate_measured(ctx, 0))
     tried = solver.tried
     if solver.outcome != RUNNING or tried != 1:
         return settle(ctx)
@@ -114,7 +114,7 @@ def iterate(ctx):
     change = first
     trusted, log_trusted = solver.trusted, solver.log_trusted
     while solver.outcome == RUNNING:
-        moved = sweep_measured(ctx, int(untested(change, rate, log_trusted)))
+        moved = iterate_measured(ctx, int(untested(change, rate, log_trusted)))
         tries = solver.tried - tried
         if moved > ROUNDING:
             change = binary_log(moved)

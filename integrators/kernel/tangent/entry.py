@@ -32,12 +32,12 @@ from integrators.kernel.simd.memory import get, put, spread
 from integrators.kernel.simd.views import doubles
 from integrators.kernel.step.begin import choose, predict, prepare, rewind, set_factors, set_step
 from integrators.kernel.step.finish import commit, finish
+from integrators.kernel.step.fixed_point import iterate_measured
 from integrators.kernel.step.handover import solve_implicitly
 from integrators.kernel.step.iterate import settle, test
 from integrators.kernel.step.sample import copy, vectors_of_state, write
 from integrators.kernel.step.size import take_sizes
 from integrators.kernel.step.stages import offset
-from integrators.kernel.step.sweep import sweep_measured
 from integrators.kernel.tangent.memory import Tangents
 
 context, tangents = view(Context), view(Tangents)
@@ -133,7 +133,7 @@ def differentiate(ctx, trajectory, vectors, earlier, part, pulls):
         take_sizes(vectors)
     else:
         choose(vectors)
-    test(vectors, sweep_measured(vectors, solver.free if solver.predicted else 0))
+    test(vectors, iterate_measured(vectors, solver.free if solver.predicted else 0))
     outcome = settle(vectors)
     if outcome == DONE:
         outcome = finish(vectors)

@@ -119,7 +119,7 @@ def test_a_trajectory_is_the_same_bits_alone_in_any_place_and_on_any_threads(nam
     program = HBVMProgram(problem.system, k=k, s=8, h=h)
     starts = problem.y0 * (1 + 0.1 * rng.uniform(-1, 1, size=(21, 1)))
     parameters = problem.par * (1 + 0.1 * rng.uniform(-1, 1, size=(21, 1)))
-    starts[3] *= 40.0  # one that needs few sweeps, one that leaves and does not arrive
+    starts[3] *= 40.0  # one that needs few iterations, one that leaves and does not arrive
     starts[7] *= 1e-4
     times = np.array([3.0, 7.3]) * h
     whole = program.batch(starts, parameters, times=times)
@@ -199,7 +199,8 @@ def test_one_failure_leaves_the_others_alone():
 def test_what_becomes_no_number_in_the_last_sweeps_is_a_failure_of_its_lane(k, least):
     h = 0.1
     # The first component is the time. In the first step the second rises towards the third, which for some
-    # trajectories is too small by rounding: there the first has no rate any more in sweeps without a test.
+    # trajectories is too small by rounding: there the first has no rate any more in iterations without a
+    # test.
     system = VectorField(
         lambda t, y, m: [1.0 + 0.0 * m.sqrt(y[2] - y[1] + (t / h) ** 20), 2.0 * y[1], 0.0 * y[2]], dim=3
     )

@@ -85,7 +85,7 @@ def test_another_system_costs_its_field_only(cache):
     before = files(folder)
     other = finish(start(folder, 0.375))
     assert not other["cached"]
-    assert len(files(folder)) == len(before) + 2  # by itself, and in whole sweeps
+    assert len(files(folder)) == len(before) + 2  # by itself, and in whole iterations
 
 
 def test_processes_that_start_at_once_agree_and_leave_no_debris(cache):

@@ -1,4 +1,4 @@
-"""Sweeps compiled together with the field do exactly what they do one by one."""
+"""Iterations compiled together with the field do exactly what they do one by one."""
 
 import numpy as np
 import pytest

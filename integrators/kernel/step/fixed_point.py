@@ -1,4 +1,4 @@
-"""One sweep of the fixed-point iteration: field, then stages from its values.
+"""One fixed-point iteration: field, then stages from its values.
 
 Second-order form: Q = q + (base + kh * sum_j A_j F_j); first-order form the
 same with kh = 1. The state is added last, so that one rounding only happens at
@@ -11,8 +11,8 @@ from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.lanes import fma
 from integrators.kernel.simd.memory import (
     call_field,
+    call_iterations,
     call_line,
-    call_sweeps,
     columns,
     combine,
     combine_only,
@@ -186,7 +186,7 @@ def product(ctx, table):
 
 
 @compiled
-def sweep(ctx, count):
+def iterations(ctx, count):
     """Iterate ``count`` times, without a test."""
     for _ in range(count):
         evaluate(ctx)
@@ -194,7 +194,7 @@ def sweep(ctx, count):
 
 
 @compiled
-def sweep_measured(ctx, before):
+def iterate_measured(ctx, before):
     """Iterate, ``before`` times and once; return the largest change that the last one made.
 
     It is relative to the size of its block; NaN if any stage is.
@@ -204,9 +204,9 @@ def sweep_measured(ctx, before):
     if before > 0:
         solver.last = INFINITY  # the next change does not follow the last one that was measured
     if ctx.fused:
-        call_sweeps(ctx.fused, ctx, before + 1, MEASURE)
+        call_iterations(ctx.fused, ctx, before + 1, MEASURE)
         return solver.change
-    sweep(ctx, before)
+    iterations(ctx, before)
     evaluate(ctx)
     ctx.stages, ctx.scratch.old_stages = ctx.scratch.old_stages, ctx.stages
     product(ctx, ctx.tables.matrix)
@@ -214,11 +214,11 @@ def sweep_measured(ctx, before):
 
 
 @compiled
-def sweep_to_the_end(ctx, count):
+def iterate_and_evaluate(ctx, count):
     """Iterate ``count`` times, and evaluate the field at the newest stages."""
     ctx.solver.tried += count + 1
     if ctx.fused and count > 0:
-        call_sweeps(ctx.fused, ctx, count, EVALUATE)
+        call_iterations(ctx.fused, ctx, count, EVALUATE)
     else:
-        sweep(ctx, count)
+        iterations(ctx, count)
         evaluate(ctx)
