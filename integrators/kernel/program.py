@@ -481,7 +481,7 @@ class AdaptiveProgram(HBVMProgram):
         Stages and degree, k >= s >= 1, k > 1.
     tol : float
         Local error per step, relative to the size of each block of the state.
-    defect : float, optional
+    quadrature_error : float, optional
         The same for the error of the quadrature, by which the energy changes; by default any.
     h : float, optional
         Length of the first step.
@@ -512,7 +512,7 @@ class AdaptiveProgram(HBVMProgram):
         k: int,
         s: int,
         tol: float,
-        defect: float | None = None,
+        quadrature_error: float | None = None,
         h: float | None = None,
         solver: str = "auto",
         max_step: float | None = None,
@@ -528,7 +528,7 @@ class AdaptiveProgram(HBVMProgram):
             legendre,  # 50 digits, which take their time to be imported
         )
 
-        self.tol, self.defect, self.first = tol, defect, h
+        self.tol, self.quadrature_error, self.first = tol, quadrature_error, h
         self.max_step, self.max_steps, self.atol = max_step, max_steps, atol
         self._timed = not system.traced or depends_on_time(system)
         self._absolute = self._sizes(atol)
@@ -545,7 +545,7 @@ class AdaptiveProgram(HBVMProgram):
         self._estimators = aligned(len(rows) * 8 * -(-k // 8))
         self._estimators.reshape(len(rows), -1)[:, :k] = rows
         # As much as rounding accounts for, and without a bound on the quadrature what the tolerance allows.
-        self._negligible = UNSEEN if defect is not None else max(tol, UNSEEN)
+        self._negligible = UNSEEN if quadrature_error is not None else max(tol, UNSEEN)
         surfaces = (
             sides(system.function("force" if self.second else "field"))
             if system.traced and not self.kept
@@ -617,7 +617,7 @@ class AdaptiveProgram(HBVMProgram):
         c, kept = self.constants, f", {self.kept.description}" if self.kept else ""
         projected = ", projection='energy'" if self.projected else ""
         return (
-            f"HBVM(k={c.k}, s={c.s}, tol={self.tol!r}, defect={self.defect!r}, h={self.first!r}, "
+            f"HBVM(k={c.k}, s={c.s}, tol={self.tol!r}, defect={self.quadrature_error!r}, h={self.first!r}, "
             f"solver={self._named!r}, max_step={self.max_step!r}, breakpoints={self._given.tolist()!r}, "
             f"max_steps={self.max_steps!r}, atol={self.atol!r}{kept}{projected})"
         )
@@ -649,13 +649,17 @@ class AdaptiveProgram(HBVMProgram):
         context.controller.allowed_error = self.tol
         bodies = getattr(self.system, "bodies", None) is not None
         context.estimate.least_slope = OF_A_BODY if bodies else OF_A_COMPONENT
-        context.controller.allowed_defect = math.inf if self.defect is None else self.defect
+        context.controller.allowed_quadrature_error = (
+            math.inf if self.quadrature_error is None else self.quadrature_error
+        )
         context.controller.error_aim = math.log(self.tol) / (2 * self.degree + 1) + math.log(MARGIN)
         context.estimate.error_decay = self.tol ** (0.5 / self.degree)
-        if self.defect is not None:
+        if self.quadrature_error is not None:
             last = self.constants.k - 1
-            context.controller.defect_aim = math.log(self.defect) / (2 * last + 1) + math.log(MARGIN)
-            context.estimate.defect_decay = self.defect ** (0.5 / last)
+            context.controller.quadrature_error_aim = math.log(self.quadrature_error) / (
+                2 * last + 1
+            ) + math.log(MARGIN)
+            context.estimate.quadrature_error_decay = self.quadrature_error ** (0.5 / last)
         context.discontinuities.doubt, context.discontinuities.slowest_decay = self._doubt, self._slowest
         context.discontinuities.negligible = self._negligible
         context.surfaces.code = self._sides.address if self._sides else 0

@@ -303,7 +303,7 @@ class AdaptiveStepper(HBVMStepper):
     def only_looks(self) -> None:
         """Take steps whatever their errors are."""
         ctx = self._context
-        ctx.controller.allowed_error = ctx.controller.allowed_defect = ctx.controller.error_aim = (
+        ctx.controller.allowed_error = ctx.controller.allowed_quadrature_error = ctx.controller.error_aim = (
             ctx.discontinuities.doubt
         ) = math.inf
         ctx.estimate.asks = 0

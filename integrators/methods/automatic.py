@@ -4,11 +4,11 @@ The cheapest one by a model of what a unit of time costs, under the condition th
 quadrature, by which the energy changes, is at rounding. The model has two halves. How long a step may be:
 where Legendre coefficients of the field fall off like r^j, a step of length h in units of the distance of the
 nearest singularity has r = rho^{-1}, h = 4 r / (1 - r^2) (rho: of Bernstein's ellipse); its error
-allows ``r^(2s-1) = tol`` and its quadrature ``r^(2k-3) = defect``. What it costs: operations on vectors of
-eight stages, of the field and of the product, in each of so many iterations, and the rest of a step. All
-numbers were fitted, by least squares and in part by hand, to eighteen runs of sixteen problems
-with HBVM(8, 5), (8, 7), (16, 10) and (16, 14), on one processor without AVX-512 (Zen 3) beside other work;
-ratios of two methods' costs are right to a third there. Other processors were not measured.
+allows ``r^(2s-1) = tol`` and its quadrature ``r^(2k-3) = quadrature_error``. What it costs: operations on
+vectors of eight stages, of the field and of the product, in each of so many iterations, and the rest of a
+step. All numbers were fitted, by least squares and in part by hand, to eighteen runs of sixteen problems with
+HBVM(8, 5), (8, 7), (16, 10) and (16, 14), on one processor without AVX-512 (Zen 3) beside other work; ratios
+of two methods' costs are right to a third there. Other processors were not measured.
 """
 
 from dataclasses import dataclass
@@ -31,12 +31,12 @@ energy is as good: 7.1e-15 instead of 6.9e-15 (rms) in Henon and Heiles' problem
 SPARE = 2
 """Nodes of `WIDE` that are left over for the estimates; of `NARROW`, one."""
 
-DEFECT = 3e-17
+QUADRATURE_ERROR = 3e-17
 """Largest error allowed to a step's quadrature, as the last coefficient that k nodes see estimates it.
 
 The error itself is smaller than this estimate, with fewer nodes by more."""
 
-DEFECTS = {NARROW: 1e-14, BETWEEN: 3e-16, WIDE: DEFECT}
+QUADRATURE_ERRORS = {NARROW: 1e-14, BETWEEN: 3e-16, WIDE: QUADRATURE_ERROR}
 """The same for each number of nodes.
 
 The energy of the outer Solar System, of Kepler's, Henon and Heiles', Sitnikov's and twelve other problems
@@ -145,19 +145,19 @@ class Work:
         field = operations(system.function("force" if second else "field")) if system.traced else OPAQUE
         return cls(rows, second, field, lanes)
 
-    def per_time(self, k: int, s: int, tol: float, defect: float | None) -> float:
+    def per_time(self, k: int, s: int, tol: float, quadrature_error: float | None) -> float:
         """Return the cost of a unit of time, relative.
 
         Parameters
         ----------
         k, s : int
             Of the method; k is a multiple of eight.
-        tol, defect : float
+        tol, quadrature_error : float
             What bounds the step; ``None``: its quadrature is exact, or of no interest.
         """
         r = tol ** (1 / (2 * s - 1))
-        if defect is not None:
-            r = min(r, defect ** (1 / (2 * k - 3)))
+        if quadrature_error is not None:
+            r = min(r, quadrature_error ** (1 / (2 * k - 3)))
         factor = 1.0 if self.second else FIRST_ORDER
         per_length = B + C / s
         length = min(4 * r / (1 - r * r), (MEAN_ITERATIONS / factor - A) / per_length)
@@ -200,7 +200,7 @@ def choose(system: System, tol: float, *, lanes: bool = False) -> tuple[int, int
     -------
     k, s : int
         Of HBVM(k, s).
-    defect : float or None
+    quadrature_error : float or None
         Bound on the estimated error of a step's quadrature; ``None``: it is 0, or there is no
         energy to keep.
     """
@@ -209,7 +209,7 @@ def choose(system: System, tol: float, *, lanes: bool = False) -> tuple[int, int
 
     def bound(k: int, s: int) -> float | None:
         exact = system.energy is None or (nu is not None and exact_k(nu, s) <= k)
-        return None if exact else DEFECTS[k]
+        return None if exact else QUADRATURE_ERRORS[k]
 
     # What a field does between its nodes is not seen; only in time, or where it is code, is it likely.
     seen = system.traced and not depends_on_time(system)

@@ -278,9 +278,10 @@ class HBVM(MethodBase):
             from integrators.kernel.program import AdaptiveProgram
 
             def program(choice: tuple[int, int, float | None], tol: float = tol) -> AdaptiveProgram:
-                k, s, defect = choice
+                k, s, quadrature_error = choice
                 return AdaptiveProgram(
-                    system, k=k, s=s, tol=tol, defect=defect, h=self.h, solver=self.solver, keep=keep,
+                    system, k=k, s=s, tol=tol, quadrature_error=quadrature_error, h=self.h,
+                    solver=self.solver, keep=keep,
                     projected=self.projection is not None, **self.control(),
                 )  # fmt: skip
 

@@ -74,12 +74,12 @@ class Control:
         return result
 
     def judge(self) -> None:
-        """Set `error`, `defect`, where blocks are `certain` and `visible`; see `estimate`."""
+        """Set `error`, `quadrature_error`, where blocks are `certain` and `visible`; see `estimate`."""
         from integrators.kernel.step import estimate as rules  # imports numba, which compiling needs anyhow
         from integrators.kernel.step.discontinuities import gap_allowed
 
         w, b = self.w, self.w.b
-        error, defect = (w.variable(w.kind, w.zero.value) for _ in range(2))
+        error, quadrature_error = (w.variable(w.kind, w.zero.value) for _ in range(2))
         none = w.zero.compare("!=", 0.0)
         doubtful, visible, changing = (w.variable(w.bits, none) for _ in range(3))
         most_apart = gap_allowed(
@@ -104,7 +104,7 @@ class Control:
                     d = w.at(start, 1, i)
                     gammas, start_value, end_value = self.coefficients(d)
                     low, high, own, here, last = rules.judged(
-                        *gammas, self.number("error_decay"), self.number("defect_decay")
+                        *gammas, self.number("error_decay"), self.number("quadrature_error_decay")
                     )
                     note(doubtful, rules.is_doubtful(low, high, self.number("doubt")))
                     note(changing, rules.changes(low, high, gammas[GAMMA_0]))
@@ -129,13 +129,13 @@ class Control:
                 mass = w.unity / self.speed(start)
                 scale = rules.size_in_step(scale, tops[0] * mass)
                 slope = rules.slope_beside(slope, tops[1] * mass, self.number("least_slope"))
-                for gamma, worst in ((gamma_error, error), (gamma_last, defect)):
+                for gamma, worst in ((gamma_error, error), (gamma_last, quadrature_error)):
                     raise_to(worst, where(slope > 0.0, rules.local_error(self.h, gamma, slope, scale), 0.0))
                 note(visible, rules.is_visible(self.h, gamma_error, scale))
                 note(doubtful, w.get(w.array(Group.slots["gaps"]), start) > most_apart * scale)
 
             w.each(blocks, compare)
-        self.error, self.defect = (Value(b, b.load(worst)) for worst in (error, defect))
+        self.error, self.quadrature_error = (Value(b, b.load(worst)) for worst in (error, quadrature_error))
         self.certain = b.and_(b.not_(b.load(doubtful)), b.load(changing))
         self.visible = b.load(visible)
 
@@ -214,17 +214,17 @@ class Control:
         from integrators.kernel.step.vary import GROW, HELD_BACK
 
         w, b = self.w, self.w.b
-        limited = self.number("allowed_defect") < INFINITY
-        error_aim, defect_aim = self.number("error_aim"), self.number("defect_aim")
+        limited = self.number("allowed_quadrature_error") < INFINITY
+        error_aim, quadrature_error_aim = self.number("error_aim"), self.number("quadrature_error_aim")
         self.error = log_of_order(self.error, self.number("error_power"))
-        self.defect = log_of_order(self.defect, self.number("defect_power"))
+        self.quadrature_error = log_of_order(self.quadrature_error, self.number("quadrature_error_power"))
         factor = as_errors_allow(
             self.error,
             self.row("error_behind"),
             error_aim,
-            self.defect,
-            self.row("defect_behind"),
-            defect_aim,
+            self.quadrature_error,
+            self.row("quadrature_error_behind"),
+            quadrature_error_aim,
             limited,
             log_ratio(self.h / self.row("length_behind").absolute()),
         )
@@ -233,7 +233,7 @@ class Control:
         self.factor = as_iterations_allow(
             bounded(factor, GROW), self.number("busy"), iterations, self.h, self.limit
         )
-        room = room_for_longer(self.error, error_aim, self.defect, defect_aim, limited)
+        room = room_for_longer(self.error, error_aim, self.quadrature_error, quadrature_error_aim, limited)
         kept = b.and_(room.compare("<=", self.number("worth")), self.visible)
         self.free = b.or_(self.factor.compare(">=", HELD_BACK), kept)
 
@@ -249,7 +249,10 @@ class Control:
             b.load(w.alive),
             self.certain,
             is_good(
-                self.error, self.number("allowed_error"), self.defect, self.number("allowed_defect")
+                self.error,
+                self.number("allowed_error"),
+                self.quadrature_error,
+                self.number("allowed_quadrature_error"),
             ).value,
         )
         self.aim()
@@ -267,7 +270,8 @@ class Control:
         )
         w.put(w.unity.where(good, 0.0), w.array(slots["ordinary"]))
         news = {
-            "t0": t, "time_low": low, "error_behind": self.error, "defect_behind": self.defect,
+            "t0": t, "time_low": low, "error_behind": self.error,
+            "quadrature_error_behind": self.quadrature_error,
             "length_behind": w.h, "length_limit": self.limit, "h": length, "ratio": self.factor,
             "begin": w.unity, "before": Value(b, b.load(w.iterations)), "since": since,
         }  # fmt: skip

@@ -67,13 +67,13 @@ class Group(Memory):
     next_error = Array("dim", "lanes")
     # what such a step is judged by, as in `Context`, and its end; see `ensemble.control`
     allowed_error = Real()
-    allowed_defect = Real()
+    allowed_quadrature_error = Real()
     error_power = Real()  # one over the order of the error,
-    defect_power = Real()  # and of the defect
+    quadrature_error_power = Real()  # and of the quadrature error
     error_aim = Real()
-    defect_aim = Real()
+    quadrature_error_aim = Real()
     error_decay = Real()
-    defect_decay = Real()
+    quadrature_error_decay = Real()
     least_slope = Real()
     doubt = Real()
     negligible = Real()  # part of a block's size that the error at a jump may be; infinite: nobody looks
@@ -89,7 +89,7 @@ class Group(Memory):
     worth = Real()  # how much longer steps the errors must allow for the implicit solver (logarithm)
     length_behind = Array("lanes")
     error_behind = Array("lanes")
-    defect_behind = Array("lanes")
+    quadrature_error_behind = Array("lanes")
     length_limit = Array("lanes")
     stop = Array("lanes")  # time of the next sample
     unwatched = Array("lanes")  # fewer steps than this may follow one another without a look at the lane

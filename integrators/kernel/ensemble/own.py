@@ -21,7 +21,7 @@ from integrators.kernel.parts.implicit import FIXED_POINT
 from integrators.kernel.simd.memory import call_steps, put, splat8
 from integrators.kernel.step.anew import reset
 from integrators.kernel.step.begin import INFINITY, is_within_reach
-from integrators.kernel.step.control import defect_power, error_power, is_distinct
+from integrators.kernel.step.control import error_power, is_distinct, quadrature_error_power
 from integrators.kernel.step.discontinuities import end_behind, is_near_discontinuity
 from integrators.kernel.step.rule import FIRST_RATE, SMALLEST
 from integrators.kernel.step.size import speed_of
@@ -98,9 +98,9 @@ def aim(group, lane):
         ctx.controller.length_behind,
         ctx.controller.length_limit,
     )
-    group.error_behind[lane], group.defect_behind[lane] = (
+    group.error_behind[lane], group.quadrature_error_behind[lane] = (
         ctx.controller.error_behind,
-        ctx.controller.defect_behind,
+        ctx.controller.quadrature_error_behind,
     )
     group.stop[lane] = ctx.controller.stop
     suspect = ctx.controller.attempts > 0 or is_near_discontinuity(ctx, h)
@@ -132,7 +132,10 @@ def catch_up(group, lane, ctx):
     ctx.t0, ctx.time_low = group.t0[lane], group.time_low[lane]
     controller.next_length = group.h[lane]
     ctx.length = controller.length_behind = group.length_behind[lane]
-    controller.error_behind, controller.defect_behind = group.error_behind[lane], group.defect_behind[lane]
+    controller.error_behind, controller.quadrature_error_behind = (
+        group.error_behind[lane],
+        group.quadrature_error_behind[lane],
+    )
     controller.length_limit = group.length_limit[lane]
     ctx.counters.steps += int(group.since[lane])
     ctx.implicit.slow = 0
@@ -220,10 +223,16 @@ def crawls(group, lane, ctx):
 def share(group, ctx):
     """Let a group know what its steps are judged by."""
     controller, estimate, discontinuities = ctx.controller, ctx.estimate, ctx.discontinuities
-    group.allowed_error, group.allowed_defect = controller.allowed_error, controller.allowed_defect
-    group.error_power, group.defect_power = error_power(controller.error_degree), defect_power(ctx.k)
-    group.error_aim, group.defect_aim = controller.error_aim, controller.defect_aim
-    group.error_decay, group.defect_decay = estimate.error_decay, estimate.defect_decay
+    group.allowed_error, group.allowed_quadrature_error = (
+        controller.allowed_error,
+        controller.allowed_quadrature_error,
+    )
+    group.error_power, group.quadrature_error_power = (
+        error_power(controller.error_degree),
+        quadrature_error_power(ctx.k),
+    )
+    group.error_aim, group.quadrature_error_aim = controller.error_aim, controller.quadrature_error_aim
+    group.error_decay, group.quadrature_error_decay = estimate.error_decay, estimate.quadrature_error_decay
     group.least_slope, group.doubt, group.busy = estimate.least_slope, discontinuities.doubt, BUSY
     group.negligible = discontinuities.negligible if discontinuities.doubt < INFINITY else INFINITY
     group.outermost = ctx.tables.nodes[0]

@@ -38,4 +38,4 @@ class LineContext(Context):
     owed = Array("invariants")  # what the step ahead is to take back of what rounding took from them
     lost = Integer()  # times that an invariant had moved by more than rounding accounts for
     culprit = Integer()  # the invariant that is none,
-    defect = Real()  # and its rate of change beside the terms of that
+    change_rate = Real()  # and its rate of change beside the terms of that

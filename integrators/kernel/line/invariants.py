@@ -195,7 +195,7 @@ def find_change(ctx, threshold):
     """Return whether one of the invariants is none: `LineContext.culprit`.
 
     Its gradient along the field, summed over the stages, is compared with the sum
-    of the absolute values of the terms; their ratio is left in `LineContext.defect`.
+    of the absolute values of the terms; their ratio is left in `LineContext.change_rate`.
     """
     terms, weights, lanes, dim = ctx.terms, ctx.tables.weights, ctx.lanes, ctx.rows
     for a in range(ctx.invariants):
@@ -212,6 +212,6 @@ def find_change(ctx, threshold):
             size += total(sizes)
         slope = abs(ordered(ctx))
         if not slope <= threshold * size:  # a gradient that is not finite is no good either
-            ctx.culprit, ctx.defect = a, slope / size
+            ctx.culprit, ctx.change_rate = a, slope / size
             return True
     return False

@@ -102,16 +102,16 @@ class Kept:
 
     def refusal(self, contexts: tuple[Any, Any], t: float) -> str:
         """Return why the step from t has ended as `NOT_KEPT`: the step of a pair of contexts, or a part."""
-        culprit = next(context for context in contexts if context.defect != 0.0)
+        culprit = next(context for context in contexts if context.change_rate != 0.0)
         return (
             f"{self.names[culprit.culprit]} is not an invariant: in the step from t = {t!r} the terms of its "
-            f"rate of change do not cancel, but leave {culprit.defect:.1e} of their size; leave it out."
+            f"rate of change do not cancel, but leave {culprit.change_rate:.1e} of their size; leave it out."
         )
 
     def load(self, contexts: tuple[Any, Any], y: Array, par: Array, t0: float) -> None:
         """Put into a pair of contexts what follows from the start (t0, y) and from the parameters."""
         own, partial = contexts
-        own.lost = own.defect = partial.defect = 0
+        own.lost = own.change_rate = partial.change_rate = 0
         if self.names:
             own.metric[:] = metric_of(self.system, par)
             own.active[:] = independent(self.system, self.values, own.metric, y, par, t0)

@@ -7,14 +7,14 @@ class Controller(Part):
     """The lengths of adaptive steps, and what they follow from; see `step.vary` and `step.control`."""
 
     allowed_error = Real()  # the estimated local error of a step, relative, at most
-    allowed_defect = Real()  # the same of the quadrature; infinite: any
+    allowed_quadrature_error = Real()  # the same of the quadrature; infinite: any
     error_degree = Integer()  # of the Legendre coefficient that the error is estimated by
     error_aim = Real()  # logarithm of the error to aim at, divided by its order
-    defect_aim = Real()
+    quadrature_error_aim = Real()
     error_behind = Real()  # logarithm of the last step's estimated error, divided by its order ...
     error_ahead = Real()  # ... and of that of the step that is solved
-    defect_behind = Real()  # the same for the defect
-    defect_ahead = Real()
+    quadrature_error_behind = Real()  # the same for the quadrature error
+    quadrature_error_ahead = Real()
     length_behind = Real()  # of the last step; 0: unknown
     next_length = Real()  # of the next step to be tried
     length_after = Real()  # of the one after the step that is solved

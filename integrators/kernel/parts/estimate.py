@@ -17,13 +17,13 @@ class Estimate(Part):
     scale = Array("blocks.count")  # of blocks: their size in the step that is estimated,
     slope = Array("blocks.count")  # the largest coefficient of their field,
     gamma_error = Array("blocks.count")  # gamma_s, which the error is estimated by,
-    gamma_last = Array("blocks.count")  # gamma_{k-1}, which the defect is estimated by,
+    gamma_last = Array("blocks.count")  # gamma_{k-1}, which the quadrature error is estimated by,
     abrupt = Array("blocks.count")  # and the largest that does not fall off as a smooth field's do
     fastest = Array("blocks.count")  # scale in each group, as a velocity,
     steepest = Array("blocks.count")  # and slope
     least_slope = Real()  # of a block's field beside the largest in its group, where errors are estimated
     error_decay = Real()  # of coefficients from one degree to the next, where the error is allowed
-    defect_decay = Real()  # the same where the defect is
+    quadrature_error_decay = Real()  # the same where the quadrature error is
     absolute = Array("blocks.count")  # the absolute tolerance of blocks, divided by the relative one
     expected = Array("blocks.count")  # the largest size that blocks will reach, as far as is known
     rescaled = Integer()  # > 0: errors are relative to that where it is larger than a block's own size

@@ -56,9 +56,9 @@ def is_distinct(h, t):
 
 
 @for_both_widths
-def is_good(error, allowed, defect, allowed_defect):
+def is_good(error, allowed, quadrature_error, allowed_quadrature_error):
     """Whether a step is good enough by its estimated errors."""
-    return (error <= allowed) & (defect <= allowed_defect)
+    return (error <= allowed) & (quadrature_error <= allowed_quadrature_error)
 
 
 @for_both_widths
@@ -68,7 +68,7 @@ def error_power(degree):
 
 
 @for_both_widths
-def defect_power(k):
+def quadrature_error_power(k):
     """Return one over the order of the quadrature's error with k nodes, as it is estimated."""
     return 1.0 / (2.0 * k - 1.0)
 
@@ -89,14 +89,23 @@ def log_ratio(x):
 
 
 @for_both_widths
-def as_errors_allow(error, error_behind, error_aim, defect, defect_behind, defect_aim, limited, change):
+def as_errors_allow(
+    error,
+    error_behind,
+    error_aim,
+    quadrature_error,
+    quadrature_error_behind,
+    quadrature_error_aim,
+    limited,
+    change,
+):
     """Return the logarithm of the next step's length relative to this one's, as the estimates allow.
 
     Parameters
     ----------
     error, error_behind, error_aim : float
         Of this step, of the step before, and to aim at; see `log_factor`.
-    defect, defect_behind, defect_aim : float
+    quadrature_error, quadrature_error_behind, quadrature_error_aim : float
         The same for the quadrature's error,
     limited : bool
         if that is limited too.
@@ -104,15 +113,15 @@ def as_errors_allow(error, error_behind, error_aim, defect, defect_behind, defec
         Logarithm of this step's length relative to that of the step before.
     """
     by_error = log_factor(error_aim, error, error_behind, change)
-    by_defect = log_factor(defect_aim, defect, defect_behind, change)
-    return where(limited, least(by_defect, by_error), by_error)
+    by_quadrature_error = log_factor(quadrature_error_aim, quadrature_error, quadrature_error_behind, change)
+    return where(limited, least(by_quadrature_error, by_error), by_error)
 
 
 @for_both_widths
-def room_for_longer(error, error_aim, defect, defect_aim, limited):
+def room_for_longer(error, error_aim, quadrature_error, quadrature_error_aim, limited):
     """Return the logarithm of how much longer a step might have been for its estimated errors."""
     room = error_aim - error
-    return where(limited, least(defect_aim - defect, room), room)
+    return where(limited, least(quadrature_error_aim - quadrature_error, room), room)
 
 
 @for_both_widths

@@ -179,7 +179,16 @@ def next_coefficient(here, before, decay):
 
 @for_both_widths
 def judged(
-    gamma_0, gamma_1, gamma_2, gamma_3, before_error, at_error, before_last, last, error_decay, defect_decay
+    gamma_0,
+    gamma_1,
+    gamma_2,
+    gamma_3,
+    before_error,
+    at_error,
+    before_last,
+    last,
+    error_decay,
+    quadrature_error_decay,
 ):
     """Return what the sizes of a row's coefficients say of it; see `GAMMA_0`.
 
@@ -189,13 +198,13 @@ def judged(
         The largest of those that a step resolves first, but for the mean, and of the last two.
     slope : float
         The largest of the low ones and the mean: how steep the field is.
-    error, defect : float
+    error, quadrature_error : float
         What the errors are estimated by.
     """
     low, high = lowest(gamma_1, gamma_2, gamma_3), greatest(before_last, last)
     error = next_coefficient(at_error, before_error, error_decay)
-    defect = next_coefficient(last, before_last, defect_decay)
-    return low, high, greatest(gamma_0, low), error, defect
+    quadrature_error = next_coefficient(last, before_last, quadrature_error_decay)
+    return low, high, greatest(gamma_0, low), error, quadrature_error
 
 
 @for_both_widths
@@ -305,13 +314,13 @@ def estimate(ctx):
             ctx.estimate.abrupt[b] = greatest(ctx.estimate.gamma_error[b], ctx.estimate.gamma_last[b])
     elif doubtful:
         note_what_stays(ctx)
-    allowed, allowed_defect, negligible = (
+    allowed, allowed_quadrature_error, negligible = (
         ctx.controller.allowed_error,
-        ctx.controller.allowed_defect,
+        ctx.controller.allowed_quadrature_error,
         discontinuities.negligible,
     )
     narrow = h <= NARROWEST * abs(ctx.t0)
-    error, defect = 0.0, 0.0
+    error, quadrature_error = 0.0, 0.0
     not_smooth = borrowed = 0
     rescaled, slopes, absolute = ctx.estimate.rescaled, ctx.estimate.slope, ctx.estimate.absolute
     for b in range(ctx.blocks.count):
@@ -326,30 +335,33 @@ def estimate(ctx):
             )
             if slope > slopes[b] and high <= UNSEEN * steepest:
                 high = 0.0
-            most, most_defect = INFINITY, INFINITY
+            most, most_quadrature_error = INFINITY, INFINITY
             if doubtful and high > 0.0:
                 slight = BESIDE_NOTHING * negligible if narrow else negligible
                 if (
                     discontinuities.count > 0
                     and h * max(high, max(gamma_error, gamma_last)) <= slight * scale
                 ):
-                    most, most_defect = SLIGHT * allowed, SLIGHT * allowed_defect
+                    most, most_quadrature_error = SLIGHT * allowed, SLIGHT * allowed_quadrature_error
                 elif h * high > negligible * scale and not narrow:
                     not_smooth = 1
             block_error = least(most, local_error(h, gamma_error, slope, scale))
             error = greatest(error, block_error)
             if absolute[b] > own:
                 scale = max(own, ctx.estimate.expected[b]) if rescaled else own
-            block_defect = least(most_defect, local_error(h, gamma_last, slope, scale))
-            defect = greatest(defect, block_defect)
+            block_quadrature_error = least(most_quadrature_error, local_error(h, gamma_last, slope, scale))
+            quadrature_error = greatest(quadrature_error, block_quadrature_error)
             if rescaled:
                 times = scale / own
-                fits = block_error * times <= allowed and block_defect * times <= allowed_defect
+                fits = (
+                    block_error * times <= allowed
+                    and block_quadrature_error * times <= allowed_quadrature_error
+                )
                 if not fits or (doubtful and h * high > negligible * own):
                     borrowed = 1
     discontinuities.not_smooth, ctx.estimate.borrowed = not_smooth, borrowed
     compare_ends(ctx)
-    return error, defect
+    return error, quadrature_error
 
 
 @compiled
@@ -357,7 +369,7 @@ def measure_blocks(ctx):
     """Set the blocks' scales and coefficients; return whether one does not fall off well enough."""
     blocks = ctx.blocks
     h, doubt = abs(ctx.h), ctx.discontinuities.doubt
-    error_decay, defect_decay = ctx.estimate.error_decay, ctx.estimate.defect_decay
+    error_decay, quadrature_error_decay = ctx.estimate.error_decay, ctx.estimate.quadrature_error_decay
     scale, slopes, gamma_error, gamma_last = (
         ctx.estimate.scale,
         ctx.estimate.slope,
@@ -372,7 +384,7 @@ def measure_blocks(ctx):
     doubtful, changing = False, False
     for d in range(ctx.rows):
         b, gammas = blocks.of_row[d], ctx.estimate.coefficients + 8 * d
-        low, high, slope, error, defect = judged(
+        low, high, slope, error, quadrature_error = judged(
             gammas[GAMMA_0],
             gammas[GAMMA_1],
             gammas[GAMMA_2],
@@ -382,14 +394,14 @@ def measure_blocks(ctx):
             gammas[BEFORE_LAST],
             gammas[LAST],
             error_decay,
-            defect_decay,
+            quadrature_error_decay,
         )
         doubtful |= is_doubtful(low, high, doubt)
         changing |= changes(low, high, gammas[GAMMA_0])
         scale[b] = greatest(scale[b], size(momentum(ctx, d)) + h * slope)
         slopes[b] = greatest(slopes[b], slope)
         gamma_error[b] = greatest(gamma_error[b], error)
-        gamma_last[b] = greatest(gamma_last[b], defect)
+        gamma_last[b] = greatest(gamma_last[b], quadrature_error)
     for b in range(blocks.count):
         g = group[b]
         top[g] = greatest(top[g], scale[b] * blocks.speed[b])

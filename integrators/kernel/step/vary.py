@@ -33,12 +33,12 @@ from integrators.kernel.step.control import (
     as_errors_allow,
     as_iterations_allow,
     bounded,
-    defect_power,
     error_power,
     is_distinct,
     is_good,
     log_of_order,
     log_ratio,
+    quadrature_error_power,
     room_for_longer,
 )
 from integrators.kernel.step.discontinuities import has_discontinuity, keep_end, record, undo
@@ -135,7 +135,7 @@ def iterate(ctx):
 
 
 @compiled
-def aim(ctx, error, defect, grow):
+def aim(ctx, error, quadrature_error, grow):
     """Return the next step's length relative to this one's, from what is estimated for this one."""
     controller = ctx.controller
     if not error < INFINITY:
@@ -143,16 +143,16 @@ def aim(ctx, error, defect, grow):
     h, behind = ctx.h, controller.length_behind
     known = behind != 0.0
     error = log_of_order(error, error_power(controller.error_degree))
-    defect = log_of_order(defect, defect_power(ctx.k))
-    controller.error_ahead, controller.defect_ahead = error, defect
+    quadrature_error = log_of_order(quadrature_error, quadrature_error_power(ctx.k))
+    controller.error_ahead, controller.quadrature_error_ahead = error, quadrature_error
     factor = as_errors_allow(
         error,
         controller.error_behind if known else INFINITY,
         controller.error_aim,
-        defect,
-        controller.defect_behind if known else INFINITY,
-        controller.defect_aim,
-        controller.allowed_defect < INFINITY,
+        quadrature_error,
+        controller.quadrature_error_behind if known else INFINITY,
+        controller.quadrature_error_aim,
+        controller.allowed_quadrature_error < INFINITY,
         log_ratio(h / behind) if known else 0.0,
     )
     return bounded(factor, grow)
@@ -172,9 +172,9 @@ def watch(ctx, factor):
     room = room_for_longer(
         controller.error_ahead,
         controller.error_aim,
-        controller.defect_ahead,
-        controller.defect_aim,
-        controller.allowed_defect < INFINITY,
+        controller.quadrature_error_ahead,
+        controller.quadrature_error_aim,
+        controller.allowed_quadrature_error < INFINITY,
     )
     slow = 0
     if factor < HELD_BACK:
@@ -328,12 +328,12 @@ def accepts(ctx, outcome, iterations, implicit):
     is that of the next attempt.
     """
     controller, surfaces = ctx.controller, ctx.surfaces
-    error, defect = estimate_attempt(ctx, outcome, implicit)
-    factor = aim(ctx, error, defect, GROW if controller.attempts == 0 else 1.0)
+    error, quadrature_error = estimate_attempt(ctx, outcome, implicit)
+    factor = aim(ctx, error, quadrature_error, GROW if controller.attempts == 0 else 1.0)
     if outcome == DONE and ctx.estimate.blind and abs(ctx.h) > controller.longest_blind:
         reject(ctx, outcome, controller.longest_blind / abs(ctx.h), implicit)
         return False
-    good = is_good(error, controller.allowed_error, defect, controller.allowed_defect)
+    good = is_good(error, controller.allowed_error, quadrature_error, controller.allowed_quadrature_error)
     if surfaces.code and (surfaces.locating or (surfaces.across != NO_SURFACE and not good)):
         place = locate(ctx, outcome, good)
         if place == AGAIN:
@@ -362,8 +362,10 @@ def estimate_attempt(ctx, outcome, implicit):
     if outcome != DONE:
         return INFINITY, INFINITY
     surfaces.crossed = 1 if across >= 0 or (across == END_ACROSS and surfaces.locating == 0) else 0
-    error, defect = estimate_implicit(ctx) if implicit else estimate(ctx)
-    fits = is_good(error, ctx.controller.allowed_error, defect, ctx.controller.allowed_defect)
+    error, quadrature_error = estimate_implicit(ctx) if implicit else estimate(ctx)
+    fits = is_good(
+        error, ctx.controller.allowed_error, quadrature_error, ctx.controller.allowed_quadrature_error
+    )
     if implicit:
         if surfaces.crossed and (discontinuities.not_smooth or fits) and has_discontinuity(ctx, fits):
             error = INFINITY
@@ -378,7 +380,7 @@ def estimate_attempt(ctx, outcome, implicit):
     if surfaces.count and fits and error < INFINITY and across == NO_SURFACE and grazes(ctx):
         record(ctx, ctx.t0, ctx.h)
         error = INFINITY
-    return error, defect
+    return error, quadrature_error
 
 
 @compiled
@@ -473,7 +475,7 @@ def take(ctx):
     controller.next_length = controller.length_after
     controller.length_behind = ctx.h
     controller.error_behind = controller.error_ahead
-    controller.defect_behind = controller.defect_ahead
+    controller.quadrature_error_behind = controller.quadrature_error_ahead
     if ctx.pace.code:
         keep_pace(ctx)
     if ctx.surfaces.code:

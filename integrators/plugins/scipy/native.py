@@ -10,7 +10,7 @@ from scipy.integrate import DenseOutput
 
 import integrators
 from integrators.kernel.fixed import FixedStepper
-from integrators.methods.automatic import DEFECT, exact_k
+from integrators.methods.automatic import QUADRATURE_ERROR, exact_k
 from integrators.plugins.scipy.field import Field
 from integrators.protocol import Samples, Status
 from integrators.running.times import plan
@@ -57,15 +57,15 @@ class NativeSteps:
         first_step: float | None, every: int,
     ) -> None:  # fmt: skip
         t, y, t_bound = solver.t, solver.y, solver.t_bound
-        defect = None
+        quadrature_error = None
         if k is None:
-            k, defect = nodes(field.system, s)
+            k, quadrature_error = nodes(field.system, s)
         self.k, self._field, self._every, self._longest = k, field, every, solver.max_step
         self._t_bound = t_bound
         if h is None:
             tol = float(np.min(solver.rtol))
             atol = tuple(solver.atol.tolist()) if solver.atol.ndim else float(solver.atol)
-            program = _program(field.system, k, s, first_step, tol, defect, atol)
+            program = _program(field.system, k, s, first_step, tol, quadrature_error, atol)
             self._program_between = _program(field.system, k, s, BEYOND)
         else:
             program = self._program_between = _program(field.system, k, s, h)
@@ -216,11 +216,11 @@ def nodes(system: System, s: int) -> tuple[int, float | None]:
     """
     k = max(FEWEST, -(-2 * s // LANES) * LANES)
     if not system.traced:
-        return k, DEFECT
+        return k, QUADRATURE_ERROR
     if system.kind == "poisson" or system.energy is None:
         return k, None
     nu = degree(system)
-    return k, None if nu is not None and exact_k(nu, s) <= k else DEFECT
+    return k, None if nu is not None and exact_k(nu, s) <= k else QUADRATURE_ERROR
 
 
 @lru_cache(maxsize=32)
@@ -230,14 +230,14 @@ def _program(
     s: int,
     h: float | None,
     tol: float | None = None,
-    defect: float | None = None,
+    quadrature_error: float | None = None,
     atol: float | tuple[float, ...] | None = None,
 ) -> "integrators.protocol.Program":
-    if defect is not None:
+    if quadrature_error is not None:
         from integrators.kernel.program import AdaptiveProgram
 
         assert tol is not None
-        return AdaptiveProgram(system, k=k, s=s, tol=tol, defect=defect, h=h, atol=atol)
+        return AdaptiveProgram(system, k=k, s=s, tol=tol, quadrature_error=quadrature_error, h=h, atol=atol)
     if k == s:
         return integrators.Gauss(s=s, h=h, tol=tol, atol=atol).compile(system)
     return integrators.HBVM(k=k, s=s, h=h, tol=tol, atol=atol).compile(system)

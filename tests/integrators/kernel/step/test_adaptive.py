@@ -9,7 +9,7 @@ import integrators
 import problems
 from integrators import HBVM, Gauss, testing
 from integrators.kernel import tables
-from integrators.methods.automatic import DEFECTS, choose
+from integrators.methods.automatic import QUADRATURE_ERRORS, choose
 from integrators.protocol import Status
 from problems import Problem, VectorField
 from problems.errors import InputError
@@ -208,19 +208,21 @@ def test_a_field_that_is_not_finite_from_some_place_on_says_so():
 def test_k_and_s_are_the_cheapest_under_the_bound_of_the_quadrature():
     tight, loose = 3e-16, 1e-3
     # Few components: sixteen stages cost little more than eight, and steps are three times as long.
-    assert choose(kepler(1).system, tight) == choose(kepler(1).system, loose) == (16, 14, DEFECTS[16])
+    assert (
+        choose(kepler(1).system, tight) == choose(kepler(1).system, loose) == (16, 14, QUADRATURE_ERRORS[16])
+    )
     # Many: the product takes four times as long.
     planets = problems.load("outer_solar_system").system
-    assert choose(planets, tight) == (16, 14, DEFECTS[16])
-    assert choose(planets, 1e-6) == (8, 7, DEFECTS[8])
+    assert choose(planets, tight) == (16, 14, QUADRATURE_ERRORS[16])
+    assert choose(planets, 1e-6) == (8, 7, QUADRATURE_ERRORS[8])
     # Trajectories side by side: the product takes four times as long for all.
-    assert choose(kepler(1).system, tight, lanes=True) == (8, 7, DEFECTS[8])
+    assert choose(kepler(1).system, tight, lanes=True) == (8, 7, QUADRATURE_ERRORS[8])
     # A polynomial: longer steps gain more than twelve stages cost, if none of them is exact with fewer.
-    assert choose(problems.load("fput").system, tight, lanes=True) == (12, 11, DEFECTS[12])
+    assert choose(problems.load("fput").system, tight, lanes=True) == (12, 11, QUADRATURE_ERRORS[12])
     assert choose(problems.load("henon_heiles").system, loose, lanes=True) == (8, 5, None)
     # A cubic energy is kept exactly, and needs no bound.
-    k, s, defect = choose(problems.load("henon_heiles").system, loose)
-    assert (k, defect) == (8, None)
+    k, s, quadrature_error = choose(problems.load("henon_heiles").system, loose)
+    assert (k, quadrature_error) == (8, None)
     assert 2 * k >= 3 * s
     assert choose(problems.VectorField(lambda y: [-y[0]], dim=1), 1e-8)[2] is None
 

@@ -37,8 +37,8 @@ def sizes(t, y, par, out):
 
 
 def control(t, y, par, out):
-    error, defect = log_of_order(y[0], 0.05), log_of_order(y[1], 0.04)
-    factor = as_errors_allow(error, -y[2], -y[3], defect, -y[4], -y[5], y[6] < 1.0, y[7] - 1.0)
+    error, quadrature_error = log_of_order(y[0], 0.05), log_of_order(y[1], 0.04)
+    factor = as_errors_allow(error, -y[2], -y[3], quadrature_error, -y[4], -y[5], y[6] < 1.0, y[7] - 1.0)
     out[0] = factor
     out[1] = bounded(factor, 2.0)
     out[2] = as_iterations_allow(factor, y[2], y[3], y[4], y[5])
@@ -51,10 +51,12 @@ def ends(t, y, par, out):
 
 
 def coefficients(t, y, par, out):
-    low, high, slope, error, defect = judged(y[0], y[1], y[2], y[3], y[4], y[5], y[6], y[7], 0.3, 0.1)
+    low, high, slope, error, quadrature_error = judged(
+        y[0], y[1], y[2], y[3], y[4], y[5], y[6], y[7], 0.3, 0.1
+    )
     out[0], out[1] = low + high, slope
     out[2] = where(is_gap(y[0], y[1], y[2]), error, -1.0)
-    out[3] = defect
+    out[3] = quadrature_error
 
 
 def times(t, y, par, out):
