@@ -4,10 +4,19 @@ They are the kernel's own where it has them (`integrators.kernel.step.rule`, whi
 measured by).
 """
 
-from integrators.kernel.step.rule import FARTHEST, FLOOR, PATIENCE, ROUNDING, STAGNATION
+from integrators.kernel.step.rule import FARTHEST, FLOOR, ROUNDING, STAGNATION, STAGNATION_LIMIT
 from integrators.kernel.step.rule import MOST_ITERATIONS as MAX_ITERATIONS
 from integrators.kernel.step.rule import TOLERANCE as CONVERGED
 
-__all__ = ["CONVERGED", "FARTHEST", "FLOOR", "MAX_ITERATIONS", "MODES", "PATIENCE", "ROUNDING", "STAGNATION"]
+__all__ = [
+    "CONVERGED",
+    "FARTHEST",
+    "FLOOR",
+    "MAX_ITERATIONS",
+    "MODES",
+    "ROUNDING",
+    "STAGNATION",
+    "STAGNATION_LIMIT",
+]
 
 MODES = 13  # extrapolated, as `integrators.kernel.tables` at fixed steps: P_j(2) grows like 5.8^j

@@ -128,7 +128,7 @@ class Control:
                 scale, slope, gamma_error, gamma_last = (w.get(getattr(w, name), start) for name in MEASURED)
                 mass = w.unity / self.speed(start)
                 scale = rules.size_in_step(scale, tops[0] * mass)
-                slope = rules.slope_beside(slope, tops[1] * mass, self.number("least_slope"))
+                slope = rules.floored_slope(slope, tops[1] * mass, self.number("least_slope"))
                 for gamma, worst in ((gamma_error, error), (gamma_last, quadrature_error)):
                     raise_to(worst, where(slope > 0.0, rules.local_error(self.h, gamma, slope, scale), 0.0))
                 note(visible, rules.is_visible(self.h, gamma_error, scale))

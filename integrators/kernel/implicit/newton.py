@@ -25,8 +25,8 @@ from integrators.kernel.step.stopping import is_rounding
 
 MOST_CORRECTIONS = 40
 MOST_BLENDED = 250
-PATIENCE = 2  # changes that do not decrease, to end it between ROUNDING and STAGNATION ...
-FALLING = 0.5  # ... unless the changes of all but the smallest components still decrease so fast
+STAGNATION_LIMIT = 2  # changes that do not decrease, to end it between ROUNDING and STAGNATION ...
+STILL_CONVERGING = 0.5  # ... unless the changes of all but the smallest components still decrease so fast
 FORESEEN = 0.1  # a change that is going to be this part of the tolerance need not be seen
 FORGET = 0.7  # of the rate of contraction, from one step to the next
 SLOW = 0.2  # a Jacobian whose corrections contract no better is replaced at the next step
@@ -34,7 +34,7 @@ HOPELESS = 4  # corrections that do not decrease, or grow, to give up
 OLDEST = 64  # steps for which a Jacobian is used, so that the contraction is known anew
 CONTRACTS_AGAIN = 0.25  # contraction of the fixed-point iteration at which that is to be tried again
 SIZES_SETTLED = 1e-3  # sizes are measured until changes are this small
-FALLEN = 0.02  # down to this, a step's coefficients must halve from each to the next after a rescue
+LEAST_DECAY = 0.02  # down to this, a step's coefficients must halve from each to the next after a rescue
 
 
 @compiled
@@ -71,10 +71,12 @@ def iterate(ctx, m, which):
             break
         stalled = 0 if strict < best else stalled + 1
         best = min(best, strict)
-        if stalled and is_rounding(rough, stalled >= PATIENCE and not rough < FALLING * before):
+        if stalled and is_rounding(
+            rough, stalled >= STAGNATION_LIMIT and not rough < STILL_CONVERGING * before
+        ):
             break
         hopeless = 0 if rough < before else hopeless + 1
-        if hopeless == PATIENCE and rough < STAGNATION:
+        if hopeless == STAGNATION_LIMIT and rough < STAGNATION:
             break
         if hopeless == HOPELESS:
             return DIVERGED
@@ -135,7 +137,7 @@ def is_scattered(m):
         for d in range(m.rows):
             first += abs(gamma[8 * d])
             last += abs(gamma[at(m, m.s - 1, d)])
-    return last > max(allowed, FALLEN) * first
+    return last > max(allowed, LEAST_DECAY) * first
 
 
 @compiled

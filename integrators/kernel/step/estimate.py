@@ -208,7 +208,7 @@ def judged(
 
 
 @for_both_widths
-def slope_beside(slope, steepest, part):
+def floored_slope(slope, steepest, part):
     """Return what the field of a block counts as, at least a part of the steepest in its group."""
     return greatest(slope, part * steepest)
 
@@ -265,7 +265,7 @@ def own_size(ctx, b):
 
 
 @compiled
-def steepest_beside(ctx, b):
+def steepest_in_group(ctx, b):
     """Return the steepest field in the group of a block, for its mass."""
     return ctx.estimate.steepest[ctx.blocks.group[b]] * ctx.blocks.mass[b]
 
@@ -324,8 +324,8 @@ def estimate(ctx):
     not_smooth = borrowed = 0
     rescaled, slopes, absolute = ctx.estimate.rescaled, ctx.estimate.slope, ctx.estimate.absolute
     for b in range(ctx.blocks.count):
-        steepest = steepest_beside(ctx, b)
-        slope = slope_beside(slopes[b], steepest, ctx.estimate.least_slope)
+        steepest = steepest_in_group(ctx, b)
+        slope = floored_slope(slopes[b], steepest, ctx.estimate.least_slope)
         if slope > 0.0:
             own, scale = own_size(ctx, b), block_size(ctx, b)
             gamma_error, gamma_last, high = (
@@ -430,7 +430,7 @@ def log_decay(ctx):
         if steps == 3:
             last = next_coefficient(last, gammas[GAMMA_2], ctx.estimate.error_decay)
         if last > RESTLESS * ctx.estimate.slope[b]:
-            slope = slope_beside(ctx.estimate.slope[b], steepest_beside(ctx, b), ctx.estimate.least_slope)
+            slope = floored_slope(ctx.estimate.slope[b], steepest_in_group(ctx, b), ctx.estimate.least_slope)
             if local_error(h, last, slope, size) <= RESTING * ctx.controller.allowed_error:
                 continue
         if is_visible(

@@ -19,13 +19,13 @@ STAGNATION = 1e-13  # above it, a change that stops decreasing is a failure
 # Changes that do not decrease, to end it between ROUNDING and STAGNATION. Where the iteration's matrix is
 # far from normal the changes fall in waves: two end it early (a drift of 2.4e-16 per step, period annulus,
 # s = 2, h = 1; with five 3e-18).
-PATIENCE = 5
-# Once a change is small, how fast it has fallen tells how fast the rest will, if that is steep. One steep
-# fall may be a part of a wave (Penning trap, s = 2, h = .2: an error of 5e-15 in one step); so the average
-# fall, from a first change as large as the state to 1e-15, must promise next to nothing.
-STEEP = 0.15
+STAGNATION_LIMIT = 5
+# Once a change is small, the rate at which it has decreased tells that of what follows, if it is fast. One
+# fast decrease may be a part of a wave (Penning trap, s = 2, h = .2: an error of 5e-15 in one step); so the
+# average rate, from a first change as large as the state to 1e-15, must promise next to nothing.
+FAST_RATE = 0.15
 LEAST = 3e-17  # smaller changes are rounding
-FALL = 1e15
+TOTAL_DECREASE = 1e15
 # What may be left of a change when the step is solved. On the outer Solar System 3e-17, and values at the
 # stages before the last change, let the energy leak 7e-20 per step (Gauss(8), h = 1 year): in 1e6 years more
 # than rounding adds; with 1e-18 nothing is seen of it. But with 1e-18 an oscillator's energy falls by 2.1e-19

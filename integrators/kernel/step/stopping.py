@@ -7,10 +7,17 @@ from math import log2
 
 from integrators.kernel.native.jit import compiled, for_both_widths
 from integrators.kernel.simd.operations import binary_log, greatest, least, where
-from integrators.kernel.step.rule import FALL, LEAST, PATIENCE, ROUNDING, STAGNATION, STEEP
+from integrators.kernel.step.rule import (
+    FAST_RATE,
+    LEAST,
+    ROUNDING,
+    STAGNATION,
+    STAGNATION_LIMIT,
+    TOTAL_DECREASE,
+)
 
-LOG_TRUSTED, LOG_STEEP = log2(1e-11), log2(STEEP)
-LOG_PROMISE, LOG_FALL = log2(3.0 * LEAST), log2(FALL)
+LOG_TRUSTED, LOG_FAST_RATE = log2(1e-11), log2(FAST_RATE)
+LOG_NEGLIGIBLE, LOG_TOTAL_DECREASE = log2(3.0 * LEAST), log2(TOTAL_DECREASE)
 # Contraction, as far as it is believed. A slower one would ask for up to 40 evaluations more, which change
 # nothing: the stages are doubles, and do not move any more when their changes are below rounding. The energy
 # of oscillators with contractions of .4 to .8, 35 to 95 iterations a step,
@@ -27,8 +34,9 @@ MOST_TIMES, TRIAL = 3.0, 4.0  # times as many iterations as aimed at are too man
 def judge(change, last, best, stalled, rate, tried, tolerance, resolution):
     """Apply the rule to the change of an iteration, which is relative to the size of its block.
 
-    The iteration has converged when the change is at most the tolerance, or when it is small and falls so
-    steeply that the rest is known. It may be over when the change has stopped decreasing; see `stagnates`.
+    The iteration has converged when the change is at most the tolerance, or when it is small and decreases
+    so fast that the residual is known. It may be over when the change has stopped decreasing; see
+    `stagnates`.
 
     Parameters
     ----------
@@ -55,19 +63,19 @@ def judge(change, last, best, stalled, rate, tried, tolerance, resolution):
         What is left of it then.
     """
     size = binary_log(greatest(change, LEAST))
-    fall = size - binary_log(last)
+    latest = size - binary_log(last)
     # From 1 on, a change is no part of a size: a block was 0, or there was no change before.
     follows = last < 1.0
-    # If it is rounding, it falls that fast at least.
-    measured = follows & ((change > ROUNDING) | (fall < rate))
-    falling = change < best
+    # If it is rounding, it decreases that fast at least.
+    measured = follows & ((change > ROUNDING) | (latest < rate))
+    decreasing = change < best
     small = change <= tolerance
-    steep = follows & (fall <= LOG_STEEP) & (size <= LOG_TRUSTED)
-    known = falling & steep & (tried * (size - LOG_PROMISE) <= LOG_FALL)
+    fast = follows & (latest <= LOG_FAST_RATE) & (size <= LOG_TRUSTED)
+    known = decreasing & fast & (tried * (size - LOG_NEGLIGIBLE) <= LOG_TOTAL_DECREASE)
     return (
-        where(falling, change, best),
-        where(falling, 0.0, stalled + 1.0),
-        where(measured, least(greatest(fall, FASTEST), SLOWEST), rate),
+        where(decreasing, change, best),
+        where(decreasing, 0.0, stalled + 1.0),
+        where(measured, least(greatest(latest, FASTEST), SLOWEST), rate),
         small | known,
         greatest(change, resolution),
     )
@@ -122,18 +130,18 @@ def takes_too_long(change, rate, tries, log_rest, busy):
 
 
 @for_both_widths
-def is_rounding(change, patient):
-    """Whether rounding accounts for a change that does not decrease; ``patient``: not for the first time.
+def is_rounding(change, repeated):
+    """Whether rounding accounts for a change that does not decrease; ``repeated``: not for the first time.
 
     The change is relative to the size of its block, small blocks raised to a part of the largest.
     """
-    return change < where(patient, STAGNATION, ROUNDING)
+    return change < where(repeated, STAGNATION, ROUNDING)
 
 
 @for_both_widths
 def stagnates(change, stalled):
     """Whether an iteration is over whose changes, of this size now, have ``stalled`` so often."""
-    return (stalled > 0.0) & is_rounding(change, stalled >= PATIENCE)
+    return (stalled > 0.0) & is_rounding(change, stalled >= STAGNATION_LIMIT)
 
 
 @for_both_widths

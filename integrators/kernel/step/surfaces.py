@@ -22,8 +22,9 @@ ORDINARY, AGAIN, REACHED = range(3)
 MOST_TRIALS = 16  # of lengths of a step
 BEYOND = 1.25  # of a step is as far as its polynomial is trusted
 SECANTS = 12  # evaluations of a distance
-ROUNDED = 2.0**-50  # part of a step that its end may be from the surface,
-NEARLY, FALLS = 1e-9, 0.1  # or so much, if it has become less by no more than this: then rounding has it
+ON_SURFACE = 2.0**-50  # part of a step that its end may be from the surface,
+# or so much, if it has become less by no more than this: then rounding has it
+NEAR_SURFACE, LEAST_DECREASE = 1e-9, 0.1
 NUDGE = 2.0**-20  # part of a step by which is looked beyond a surface
 
 
@@ -116,7 +117,7 @@ def locate(ctx, outcome, fits):
     if part == 0.0:
         return ORDINARY
     apart = abs(part - 1.0)
-    if apart <= ROUNDED or (apart <= NEARLY and apart >= FALLS * surfaces.distance):
+    if apart <= ON_SURFACE or (apart <= NEAR_SURFACE and apart >= LEAST_DECREASE * surfaces.distance):
         return REACHED if fits else ORDINARY
     surfaces.distance = apart
     length = part * h
@@ -124,7 +125,7 @@ def locate(ctx, outcome, fits):
         surfaces.near = max(surfaces.near, h)
         if length >= surfaces.far:
             length = 0.5 * (h + surfaces.far)
-            if length - h <= NEARLY * h:
+            if length - h <= NEAR_SURFACE * h:
                 return ORDINARY
         if length > ctx.controller.longest or length > abs((ctx.controller.stop - ctx.t0) - ctx.time_low):
             return ORDINARY
@@ -190,10 +191,10 @@ def part_to_surface(ctx):
     for _ in range(SECANTS):
         if value == 0.0:
             break
-        fall = value_before - value
-        if fall == 0.0:
+        decrease = value_before - value
+        if decrease == 0.0:
             break
-        move = value * (at - before) / fall
+        move = value * (at - before) / decrease
         if not is_number(move):
             return 0.0
         after = min(max(at + move, 0.5), BEYOND)

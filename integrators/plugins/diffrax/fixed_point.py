@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
 
-from integrators.plugins.rule import CONVERGED, FLOOR, PATIENCE, ROUNDING, STAGNATION
+from integrators.plugins.rule import CONVERGED, FLOOR, ROUNDING, STAGNATION, STAGNATION_LIMIT
 
 HOPELESS = 8  # changes that are no new smallest one, above STAGNATION, after which the iteration has failed
 EPSILON = float(np.finfo(np.float64).eps)  # changes are in units of the precision's: single has the same rule
@@ -36,7 +36,7 @@ class FixedPoint(optx.AbstractRootFinder):
     ``options["state"]`` (structure of x without its leading axis) plus the
     largest along x's leading axis. The iteration ends when the change is at most
     0.45 epsilon, or has stopped decreasing: once while below 4.5 epsilon, or
-    `integrators.plugins.rule.PATIENCE` times while below 450 epsilon.
+    `integrators.plugins.rule.STAGNATION_LIMIT` times while below 450 epsilon.
     Where it does not contract it fails with ``nonlinear_divergence``; but if
     ``options["guessed"]`` says that the first x was a guess, it is first tried from 0.
 
@@ -81,8 +81,8 @@ class FixedPoint(optx.AbstractRootFinder):
         self, fn: Any, y: Any, args: Any, options: dict[str, Any], state: _State, tags: Any
     ) -> tuple[jax.Array, Any]:
         """Return whether to stop, and how it went."""
-        patience = jnp.where(state.best < ROUNDING / EPSILON, 1, PATIENCE)
-        stagnates = (state.stalled >= patience) & (state.best < STAGNATION / EPSILON)
+        stagnation_limit = jnp.where(state.best < ROUNDING / EPSILON, 1, STAGNATION_LIMIT)
+        stagnates = (state.stalled >= stagnation_limit) & (state.best < STAGNATION / EPSILON)
         done = (state.strict <= CONVERGED / EPSILON) | stagnates
         result = optx.RESULTS.where(state.lost, optx.RESULTS.nonlinear_divergence, optx.RESULTS.successful)
         return done | state.lost, result

@@ -36,9 +36,9 @@ from integrators.plugins.rule import (
     FLOOR,
     MAX_ITERATIONS,
     MODES,
-    PATIENCE,
     ROUNDING,
     STAGNATION,
+    STAGNATION_LIMIT,
 )
 
 SECOND_ORDER = 30.0  # times the error allowed: of 20 steps a circle, each has one of 3e-3 of the velocity
@@ -232,7 +232,7 @@ def iterate(simulation, state, table, t, h, q, v, rest, forces, work):
             best, stalled = strict, 0
         else:
             stalled += 1
-            if floored < (ROUNDING if stalled < PATIENCE else STAGNATION):
+            if floored < (ROUNDING if stalled < STAGNATION_LIMIT else STAGNATION):
                 return True
     return False
 

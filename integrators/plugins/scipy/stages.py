@@ -19,9 +19,9 @@ from integrators.plugins.rule import (
     FLOOR,
     MAX_ITERATIONS,
     MODES,
-    PATIENCE,
     ROUNDING,
     STAGNATION,
+    STAGNATION_LIMIT,
 )
 
 HOPELESS = 4  # changes that are no new smallest one, above STAGNATION, after which the iteration has failed
@@ -147,7 +147,7 @@ class Stages:
             else:
                 stalled += 1
             if best < STAGNATION:
-                if stalled and (best < ROUNDING or stalled >= PATIENCE):
+                if stalled and (best < ROUNDING or stalled >= STAGNATION_LIMIT):
                     return Solved(G, values, True, rate)
             elif stalled >= HOPELESS or iteration + 1 == most:
                 return Solved(G, values, False, np.inf)

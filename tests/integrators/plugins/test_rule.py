@@ -12,9 +12,10 @@ FOLDER = Path(integrators.plugins.__path__[0])
 
 
 def test_they_are_the_kernel_s():
-    ours = (rule.CONVERGED, rule.ROUNDING, rule.STAGNATION, rule.PATIENCE, rule.FLOOR, rule.FARTHEST)
+    ours = (rule.CONVERGED, rule.ROUNDING, rule.STAGNATION, rule.STAGNATION_LIMIT, rule.FLOOR, rule.FARTHEST)
     theirs = (
-        kernel.TOLERANCE, kernel.ROUNDING, kernel.STAGNATION, kernel.PATIENCE, kernel.FLOOR, kernel.FARTHEST
+        kernel.TOLERANCE, kernel.ROUNDING, kernel.STAGNATION, kernel.STAGNATION_LIMIT, kernel.FLOOR,
+        kernel.FARTHEST
     )  # fmt: skip
     assert ours == theirs
     assert (rule.MAX_ITERATIONS, rule.MODES) == (kernel.MOST_ITERATIONS, tables.MODES)
