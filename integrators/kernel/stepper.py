@@ -51,7 +51,7 @@ from problems.problem import System
 
 CHUNK = 1 << 14  # steps between two looks at Ctrl-C, at most
 CHUNK_WITH_EVENTS = 1 << 10  # the same where a step may take as long as many
-CLOSE = 64  # units in the last place: nothing happens in a time as short
+SHORTEST_TIME = 64  # units in the last place: nothing happens in a time as short
 FIRST_HELD = 16  # steps for which the implicit solver stays at work when it is made; `solve` has more
 
 Ended = tuple[Status, str]  # how a run is over before its end, and the reason as a sentence
@@ -256,7 +256,7 @@ class HBVMStepper(ABC):
         """Look for events from the last step to a time that lies in the step ahead."""
         search = self.search
         if search is not None and search.trouble is None and self._status is Status.RUNNING:
-            if abs(end - self.t) <= CLOSE * float(np.spacing(abs(end))):
+            if abs(end - self.t) <= SHORTEST_TIME * float(np.spacing(abs(end))):
                 return self._status
             if not self._context.solved:  # as after samples that are ends of steps
                 samples = self.advance([end], sample="partial")
@@ -387,7 +387,7 @@ class HBVMStepper(ABC):
             for context, workspace in zip((self._context, self._partial), self._implicit, strict=True):
                 context.implicit.code = solver_engine.solver.code().address
                 context.implicit.memory = workspace.address
-                context.implicit.busy = workspace.busy
+                context.implicit.target_corrections = workspace.target_corrections
                 context.point({"implicit.increment": workspace.increment})
             if self._vectors:
                 self._vectors.solve_by(self._implicit)

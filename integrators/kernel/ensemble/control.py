@@ -211,7 +211,7 @@ class Control:
             log_ratio,
             room_for_longer,
         )
-        from integrators.kernel.step.vary import GROW, HELD_BACK
+        from integrators.kernel.step.vary import LIMITED_GROWTH, MOST_GROWTH
 
         w, b = self.w, self.w.b
         limited = self.number("allowed_quadrature_error") < INFINITY
@@ -231,11 +231,11 @@ class Control:
         self.limit = self.row("length_limit") * APPROACH
         iterations = Value(b, b.load(w.iterations)) - self.row("before")
         self.factor = as_iterations_allow(
-            bounded(factor, GROW), self.number("busy"), iterations, self.h, self.limit
+            bounded(factor, MOST_GROWTH), self.number("target_iterations"), iterations, self.h, self.limit
         )
         room = room_for_longer(self.error, error_aim, self.quadrature_error, quadrature_error_aim, limited)
         kept = b.and_(room.compare("<=", self.number("worth")), self.visible)
-        self.free = b.or_(self.factor.compare(">=", HELD_BACK), kept)
+        self.free = b.or_(self.factor.compare(">=", LIMITED_GROWTH), kept)
 
     def take(self) -> None:
         """Take the step, and aim at the next one, in the lanes where that is all."""

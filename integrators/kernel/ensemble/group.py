@@ -85,7 +85,7 @@ class Group(Memory):
     next_last_coefficients = Array("rows", "lanes")
     gaps = Array("rows", "lanes")  # between blocks of the field as two steps have it where they meet
     longest = Real()  # no step is longer
-    busy = Real()  # iterations to aim at, at most
+    target_iterations = Real()  # iterations to aim at, at most
     worth = Real()  # how much longer steps the errors must allow for the implicit solver (logarithm)
     length_behind = Array("lanes")
     error_behind = Array("lanes")

@@ -26,9 +26,9 @@ from integrators.kernel.step.discontinuities import end_behind, is_near_disconti
 from integrators.kernel.step.rule import FIRST_RATE, SMALLEST
 from integrators.kernel.step.size import speed_of
 from integrators.kernel.step.vary import (
-    BUSY,
-    FUTILE,
-    HELD_BACK_STEPS,
+    LIMITED_STEPS,
+    MOST_ATTEMPTS,
+    TARGET_ITERATIONS,
     accepts,
     begin_attempts,
     log_worth,
@@ -166,7 +166,7 @@ def settle(group, lane):
         if group.events == 0 or watch(group, lane, ctx):
             step(group, lane, ctx)
         leave_if_slow(group, lane, ctx)
-    elif ctx.discontinuities.count or ctx.controller.attempts >= FUTILE:
+    elif ctx.discontinuities.count or ctx.controller.attempts >= MOST_ATTEMPTS:
         unload(group, lane, LEFT)
 
 
@@ -194,7 +194,7 @@ def step(group, lane, ctx):
 def leave_if_slow(group, lane, ctx):
     """Let a trajectory leave its lane where it needs another solver, vanishes, or does not get anywhere."""
     if group.member[lane] >= 0 and (
-        ctx.implicit.slow >= HELD_BACK_STEPS or vanishes(ctx) or crawls(group, lane, ctx)
+        ctx.implicit.slow >= LIMITED_STEPS or vanishes(ctx) or crawls(group, lane, ctx)
     ):
         unload(group, lane, LEFT)
 
@@ -233,7 +233,11 @@ def share(group, ctx):
     )
     group.error_aim, group.quadrature_error_aim = controller.error_aim, controller.quadrature_error_aim
     group.error_decay, group.quadrature_error_decay = estimate.error_decay, estimate.quadrature_error_decay
-    group.least_slope, group.doubt, group.busy = estimate.least_slope, discontinuities.doubt, BUSY
+    group.least_slope, group.doubt, group.target_iterations = (
+        estimate.least_slope,
+        discontinuities.doubt,
+        TARGET_ITERATIONS,
+    )
     group.negligible = discontinuities.negligible if discontinuities.doubt < INFINITY else INFINITY
     group.outermost = ctx.tables.nodes[0]
     group.longest = controller.longest

@@ -9,7 +9,8 @@ BESIDE = 1e-6  # of the stretch: extrema as close to its end are looked for from
 APART = 1e4  # units that times can be told apart by: a pole is looked at from a distance of as many
 POLE, ROOM = 1e3, 10.0  # where g is as many times larger than beside it, its sign changes through infinity
 MOST = 200  # evaluations for a zero
-CLOSE = 1e-3  # of the stretch: two places as close tell the slope at the zero between or beside them
+# Of the stretch: two places as close tell the slope at the zero between or beside them
+SECANT_DISTANCE = 1e-3
 EXTREMUM = 1e-10  # of the stretch: where an extremum is, if the values near it can be told apart
 EDGE, MOVES = 1e-3, 8  # part of a bracket that is its edge; how often it is moved
 NEARER = 0.125  # a place as many times closer to the start is tried next
@@ -82,7 +83,7 @@ def zero_between(ctx, search, a, b):
         if distance > 0.0 and value != at_behind:
             slope = (value - at_behind) / (x - behind)
         following = x - value / slope if slope != 0.0 else NAN
-        if distance < CLOSE and abs(following - x) <= search.resolution / 2.0:
+        if distance < SECANT_DISTANCE and abs(following - x) <= search.resolution / 2.0:
             break
         behind, at_behind = x, value
         x = following

@@ -22,7 +22,7 @@ from problems.systems.base import System
 Integers = NDArray[np.int64]
 
 LARGEST_DENSE = 64  # rows up to which the factors are dense and in the solver's memory
-BUSY = 20.0  # Newton corrections of a step to aim at, at most, where steps vary
+TARGET_CORRECTIONS = 20.0  # Newton corrections of a step to aim at, at most, where steps vary
 LARGEST_WHOLE = 128  # rows up to which there is a matrix with a Jacobian for each stage
 
 
@@ -287,9 +287,9 @@ class Workspace(Memory):
         return other
 
     @property
-    def busy(self) -> float:
+    def target_corrections(self) -> float:
         """Corrections of a step to aim at, at most."""
-        return np.inf if self.method == BLENDED else BUSY
+        return np.inf if self.method == BLENDED else TARGET_CORRECTIONS
 
     @property
     def name(self) -> str:

@@ -18,5 +18,5 @@ class Implicit(Part):
     slow = Integer()  # steps in a row at which the fixed-point iteration was slow
     held = Integer()  # steps for which the implicit solver stays at work when it takes over
     left = Integer()  # steps of these that are left
-    busy = Real()  # corrections of an adaptive step to aim at, at most
+    target_corrections = Real()  # corrections of an adaptive step to aim at, at most
     increment = Array()  # what it has found that the step adds to q, p or to y

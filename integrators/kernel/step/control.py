@@ -6,21 +6,22 @@ from integrators.kernel.native.jit import for_both_widths
 from integrators.kernel.simd.operations import binary_log, greatest, least, size, where
 
 SAFETY, SHRINK = 0.9, 0.2  # of the length from one step to the next
-SHRINKING = 0.7  # of what would have met the tolerance, after a step whose error was too large (logarithms)
+# Of what would have met the tolerance, after a step whose error was too large (logarithms)
+SHRINK_EXPONENT = 0.7
 TRUST = 0.2  # of a trend to longer steps
 # For a trend, the step before might have been 20 times as long at most (logarithm): estimates below that, in
 # a field near the smallest doubles, vary by any factor.
 FORESEEN = 3.0
 # Part of the way to a longer step, and how much may be missing there: smooth steps are not rejected and start
 # well (logarithms).
-CAUTION, HELD = 0.5, 0.25
+CAUTION, SHORTFALL = 0.5, 0.25
 LOG_SHRINK = log(SHRINK / SAFETY)
 LOG_2 = log(2.0)
 # Fast modes at rest show neither in the error nor in the first iterations. Where the iteration failed, steps
 # stay this much shorter at first, and then approach that length again by this factor a step.
 RETREAT, APPROACH = 0.5, 1.02
 SHORTEST = 2.0**-48  # of the time: a shorter step cannot be told from none
-CLOSE = 2.0**-50  # times whose relative difference is at most this are the same
+TIME_TOLERANCE = 2.0**-50  # times whose relative difference is at most this are the same
 INFINITY = float("inf")
 TINY = 1e-300  # an estimated error of 0 counts as this
 
@@ -46,7 +47,9 @@ def log_factor(aim, estimate, behind, change):
     factor = aim - estimate
     trend = change + greatest(aim - FORESEEN, behind) - estimate
     trend = where(behind < INFINITY, where(trend < 0.0, trend, TRUST * trend), 0.0)
-    return where(factor < 0.0, SHRINKING * factor, greatest(CAUTION * factor, factor - HELD) + trend)
+    return where(
+        factor < 0.0, SHRINK_EXPONENT * factor, greatest(CAUTION * factor, factor - SHORTFALL) + trend
+    )
 
 
 @for_both_widths
@@ -125,25 +128,25 @@ def room_for_longer(error, error_aim, quadrature_error, quadrature_error_aim, li
 
 
 @for_both_widths
-def bounded(factor, grow):
+def bounded(factor, most_growth):
     """Return the factor of a step's length that belongs to a logarithm, within its bounds."""
     root = 1.0 + 0.125 * factor  # exp(factor) is its eighth power: within 1 % for lengths up to 1.4 times
     fourth = (root * root) * (root * root)
-    longer = greatest(least(SAFETY * (fourth * fourth), grow), SHRINK)
+    longer = greatest(least(SAFETY * (fourth * fourth), most_growth), SHRINK)
     return where(factor > LOG_SHRINK, longer, SHRINK)  # a NaN too
 
 
 @for_both_widths
-def as_iterations_allow(factor, busy, iterations, length, limit):
+def as_iterations_allow(factor, target, iterations, length, limit):
     """Return the factor of a step's length that is good enough, made smaller for the sake of the iteration.
 
     Parameters
     ----------
     factor : float
         What the errors allow.
-    busy, iterations : float
+    target, iterations : float
         Iterations to aim at, at most, and those of this step.
     length, limit : float
         Of this step, by size, and of the next one at most.
     """
-    return least(least(factor, greatest(busy / iterations, 0.5)), limit / length)
+    return least(least(factor, greatest(target / iterations, 0.5)), limit / length)

@@ -7,7 +7,7 @@ from integrators.kernel.parts.estimate import AT_START
 from integrators.kernel.parts.surfaces import AT_ORIGIN
 from integrators.kernel.simd.memory import call_field, get, put, total
 from integrators.kernel.step.begin import INFINITY
-from integrators.kernel.step.control import CLOSE, RETREAT, SHORTEST, SHRINK
+from integrators.kernel.step.control import RETREAT, SHORTEST, SHRINK, TIME_TOLERANCE
 from integrators.kernel.step.estimate import (
     NARROWEST,
     OUTSIDE,
@@ -51,7 +51,7 @@ def has_discontinuity(ctx, ends):
 def ends_at_break(ctx):
     """Whether the field may jump at the end of the solved step."""
     controller = ctx.controller
-    close = CLOSE * max(abs(controller.stop), abs(ctx.h))
+    close = TIME_TOLERANCE * max(abs(controller.stop), abs(ctx.h))
     return controller.breaks == 1 and abs((controller.stop - ctx.t0) - ctx.h) <= close
 
 
@@ -275,7 +275,7 @@ def confirm_previous_step(ctx):
     controller = ctx.controller
     if ctx.discontinuities.boundary != EXTRAPOLATED:
         return True
-    if controller.breaks == 1 and abs(controller.stop - ctx.t0) <= CLOSE * abs(controller.stop):
+    if controller.breaks == 1 and abs(controller.stop - ctx.t0) <= TIME_TOLERANCE * abs(controller.stop):
         return True
     rows, lanes, second = ctx.rows, ctx.lanes, ctx.second
     stages, times, values = ctx.scratch.old_stages, ctx.times, ctx.scratch.sums

@@ -8,7 +8,7 @@ from integrators.kernel.step.advance import looked, step, watched
 from integrators.kernel.step.discontinuities import confirm_previous_step, is_smooth_to_end
 from integrators.kernel.step.estimate import shorten_first
 from integrators.kernel.step.sample import dimension, followed, sample, write
-from integrators.kernel.step.vary import CLOSE, ready, remaining, take
+from integrators.kernel.step.vary import TIME_TOLERANCE, ready, remaining, take
 
 context = view(Context)
 
@@ -47,7 +47,7 @@ def approach(ctx, t, budget):
         if ctx.t0 != begin:  # the step behind was undone
             rest = remaining(ctx, t)
         rest, h = abs(rest), abs(ctx.h)
-        inside = rest < h - CLOSE * abs(t)
+        inside = rest < h - TIME_TOLERANCE * abs(t)
         if (watched(ctx) or (inside and rest > (1.0 - ctx.tables.nodes[0]) * h)) and not is_smooth_to_end(
             ctx
         ):
@@ -58,7 +58,7 @@ def approach(ctx, t, budget):
         if ctx.solved == UNSOLVED:  # an event at its start has changed the state
             continue
         h = abs(ctx.h)
-        inside = rest < h - CLOSE * abs(t)
+        inside = rest < h - TIME_TOLERANCE * abs(t)
         if inside:
             return DONE, budget
         if budget == 0:
@@ -154,7 +154,7 @@ def take_steps(ctx, times, out, budget):
             return outcome
         if ctx.solved == UNSOLVED:  # an event at its start has changed the state
             continue
-        if abs(remaining(ctx, end)) < abs(ctx.h) - CLOSE * abs(end):
+        if abs(remaining(ctx, end)) < abs(ctx.h) - TIME_TOLERANCE * abs(end):
             return DONE
         if budget == 0:
             return BUDGET

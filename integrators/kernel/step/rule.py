@@ -64,5 +64,5 @@ RESTART = 2.0**-40
 # as the one before, lead from it to the longest one.
 FIRST_AT_REST = 2.0**-10
 # A step that is cut to less than this may be one from rest, which no cutting makes good enough.
-FUTILE_PART = 1e-15
+SHORTEST_PART = 1e-15
 SCALE_LASTS = 8  # steps that are good enough without it after which a block's expected size is forgotten

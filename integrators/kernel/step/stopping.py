@@ -124,9 +124,9 @@ def rate_unseen(rate):
 
 
 @for_both_widths
-def takes_too_long(change, rate, tries, log_rest, busy):
-    """Whether a shorter step is cheaper than to iterate on, after a trial; ``busy``: iterations to aim at."""
-    return (tries >= TRIAL) & (tries + (log_rest - change) / rate > MOST_TIMES * busy)
+def takes_too_long(change, rate, tries, log_rest, target):
+    """Whether a shorter step is cheaper than to iterate on, after a trial; ``target``: so many iterations."""
+    return (tries >= TRIAL) & (tries + (log_rest - change) / rate > MOST_TIMES * target)
 
 
 @for_both_widths

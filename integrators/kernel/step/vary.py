@@ -25,11 +25,11 @@ from integrators.kernel.simd.operations import binary_log, least
 from integrators.kernel.step.begin import INFINITY, begin, on_table, set_step
 from integrators.kernel.step.control import (
     APPROACH,
-    CLOSE,
     RETREAT,
     SAFETY,
     SHORTEST,
     SHRINK,
+    TIME_TOLERANCE,
     as_errors_allow,
     as_iterations_allow,
     bounded,
@@ -49,33 +49,33 @@ from integrators.kernel.step.graze import grazes
 from integrators.kernel.step.handover import solve_implicitly, want_solver
 from integrators.kernel.step.iterate import close, extra_iterations, settle, test
 from integrators.kernel.step.reversible import keep_pace
-from integrators.kernel.step.rule import FARTHEST, FIRST_RATE, FUTILE_PART, ROUNDING, SCALE_LASTS
+from integrators.kernel.step.rule import FARTHEST, FIRST_RATE, ROUNDING, SCALE_LASTS, SHORTEST_PART
 from integrators.kernel.step.stopping import rate_since, rate_unseen, takes_too_long, untested
 from integrators.kernel.step.sums import time_after
 from integrators.kernel.step.surfaces import AGAIN, REACHED, leave, locate, look_across
 
-GROW = FARTHEST  # of the length from one step to the next, at most
+MOST_GROWTH = FARTHEST  # of the length from one step to the next, at most
 # Iterations to aim at, at most. With contractions (h w)^2 a unit of time costs least at h w = 1/e, which
 # takes 18 to 1e-16. With h w (the first-order form) it would be 36, but rounding is then multiplied like the
 # terms of exp(h w) by the iterations after it: 24 take as long as 18 and end, far out in a rotating frame,
 # with three times the error; 36 err by 1e-14 in one step of a diffusion.
-BUSY = 18.0
+TARGET_ITERATIONS = 18.0
 # The implicit solver takes over after so many steps in a row that the iteration keeps from growing where the
 # errors would allow so much longer ones. Its steps cost one or two of 18 iterations through memory, and ten
 # of those of few rows or of the second-order form; the more rows, the more. Beyond MOST_ROWS they are too
 # dear to be tried where only low coefficients tell how much longer.
-HELD_BACK_STEPS = 8
-HELD_BACK = 1.2
+LIMITED_STEPS = 8
+LIMITED_GROWTH = 1.2
 GAIN, GAIN_LIGHT, GAIN_PER_ROW, MOST_ROWS = 3.0, 6.0, 0.1, 64
 LEAST_WORTH = log(GAIN)  # `log_worth` is larger; no logarithm is taken where this tells enough
-MOST_HELD_BACK_STEPS = 4096  # twice as many each time that it has gained nothing
+MOST_LIMITED_STEPS = 4096  # twice as many each time that it has gained nothing
 # A step that is too long may fail, or look like one with a discontinuity; so many in a row have one, and are
 # cut to find it.
-SURE = 3
-STAY = 16  # steps for which it then stays
+CONFIRMATIONS = 3
+LEAST_IMPLICIT_STEPS = 16  # steps for which it then stays
 # Attempts at a step after which its errors do not become small enough by cutting it; at a discontinuity they
 # do.
-FUTILE = 24
+MOST_ATTEMPTS = 24
 # From rest, by its own size, a block may follow the steps of the field's rounding: no step fails, and
 # there are many. So what the blocks will reach is asked for now and then where steps are cut to less
 # than such a part of the interval.
@@ -128,14 +128,14 @@ def iterate(ctx):
         if solver.outcome == RUNNING:
             if moved <= trusted:
                 extra_iterations(ctx, moved)
-            elif takes_too_long(change, rate, tries, solver.log_rest, BUSY):
+            elif takes_too_long(change, rate, tries, solver.log_rest, TARGET_ITERATIONS):
                 solver.outcome = DIVERGED  # not yet, but a shorter step is cheaper
                 solver.rate = known
     return close(ctx)
 
 
 @compiled
-def aim(ctx, error, quadrature_error, grow):
+def aim(ctx, error, quadrature_error, most_growth):
     """Return the next step's length relative to this one's, from what is estimated for this one."""
     controller = ctx.controller
     if not error < INFINITY:
@@ -155,7 +155,7 @@ def aim(ctx, error, quadrature_error, grow):
         controller.allowed_quadrature_error < INFINITY,
         log_ratio(h / behind) if known else 0.0,
     )
-    return bounded(factor, grow)
+    return bounded(factor, most_growth)
 
 
 @compiled
@@ -166,7 +166,7 @@ def log_worth(ctx):
 
 
 @compiled
-def watch(ctx, factor):
+def count_limited_steps(ctx, factor):
     """Count the steps in a row that only the fixed-point iteration keeps from being much longer."""
     controller = ctx.controller
     room = room_for_longer(
@@ -177,7 +177,7 @@ def watch(ctx, factor):
         controller.allowed_quadrature_error < INFINITY,
     )
     slow = 0
-    if factor < HELD_BACK:
+    if factor < LIMITED_GROWTH:
         much = room > LEAST_WORTH and room > log_worth(ctx)
         if not much and ctx.rows <= MOST_ROWS:
             decay = log_decay(ctx)
@@ -190,7 +190,7 @@ def watch(ctx, factor):
 def take_over(ctx):
     """Put the implicit solver to work."""
     implicit = ctx.implicit
-    implicit.left = STAY
+    implicit.left = LEAST_IMPLICIT_STEPS
     implicit.slow = 0
     implicit.active = 1
     ctx.counters.switches += 1
@@ -204,9 +204,9 @@ def set_hold(ctx):
     If it did so as soon as it might, steps have not become longer.
     """
     implicit = ctx.implicit
-    waited = max(implicit.held, HELD_BACK_STEPS)
+    waited = max(implicit.held, LIMITED_STEPS)
     gained = implicit.left < -1
-    implicit.held = HELD_BACK_STEPS if gained else min(2 * waited, MOST_HELD_BACK_STEPS)
+    implicit.held = LIMITED_STEPS if gained else min(2 * waited, MOST_LIMITED_STEPS)
 
 
 @compiled
@@ -220,7 +220,7 @@ def remaining(ctx, t):
     t0 = ctx.t0
     rest = (t - t0) - ctx.time_low
     size = max(max(abs(t), abs(t0)), abs(controller.length_behind))
-    close = SHORTEST if t == controller.stop else CLOSE
+    close = SHORTEST if t == controller.stop else TIME_TOLERANCE
     return 0.0 if abs(rest) <= close * size or rest * controller.next_length < 0.0 else rest
 
 
@@ -246,7 +246,7 @@ def ready(ctx):
     ctx.events.seen = ctx.events.acting = 0
     if ctx.pace.code:
         return solve_at_pace(ctx)
-    if ctx.implicit.slow >= max(ctx.implicit.held, HELD_BACK_STEPS):
+    if ctx.implicit.slow >= max(ctx.implicit.held, LIMITED_STEPS):
         if ctx.implicit.code == 0:
             return want_solver(ctx)
         take_over(ctx)
@@ -270,8 +270,12 @@ def ready(ctx):
             and ctx.estimate.asks == 1
             and ctx.estimate.rescaled == 0
         ):
-            futile = too_short or controller.attempts >= FUTILE or abs(h) < FUTILE_PART * controller.interval
-            if futile or (controller.attempts > 1 and controller.longest < INFINITY and crawls(ctx, h)):
+            hopeless = (
+                too_short
+                or controller.attempts >= MOST_ATTEMPTS
+                or abs(h) < SHORTEST_PART * controller.interval
+            )
+            if hopeless or (controller.attempts > 1 and controller.longest < INFINITY and crawls(ctx, h)):
                 ctx.length = 0.0
                 return UNSCALED
         if too_short:
@@ -329,7 +333,7 @@ def accepts(ctx, outcome, iterations, implicit):
     """
     controller, surfaces = ctx.controller, ctx.surfaces
     error, quadrature_error = estimate_attempt(ctx, outcome, implicit)
-    factor = aim(ctx, error, quadrature_error, GROW if controller.attempts == 0 else 1.0)
+    factor = aim(ctx, error, quadrature_error, MOST_GROWTH if controller.attempts == 0 else 1.0)
     if outcome == DONE and ctx.estimate.blind and abs(ctx.h) > controller.longest_blind:
         reject(ctx, outcome, controller.longest_blind / abs(ctx.h), implicit)
         return False
@@ -375,7 +379,7 @@ def estimate_attempt(ctx, outcome, implicit):
         if discontinuities.not_smooth:
             discontinuities.doubts += 1
             discontinuities.doubt_end = ctx.t0 + ctx.h
-        if (fits or discontinuities.doubts >= SURE) and has_discontinuity(ctx, fits):
+        if (fits or discontinuities.doubts >= CONFIRMATIONS) and has_discontinuity(ctx, fits):
             error = INFINITY
     if surfaces.count and fits and error < INFINITY and across == NO_SURFACE and grazes(ctx):
         record(ctx, ctx.t0, ctx.h)
@@ -401,15 +405,15 @@ def follow(ctx, factor, iterations, implicit):
     h = ctx.h
     if ctx.estimate.rescaled:
         ctx.estimate.rescaled = SCALE_LASTS if ctx.estimate.borrowed else ctx.estimate.rescaled - 1
-    if ctx.discontinuities.doubts >= SURE and ctx.discontinuities.count:
+    if ctx.discontinuities.doubts >= CONFIRMATIONS and ctx.discontinuities.count:
         controller.length_limit = INFINITY  # what the iteration allowed was for the discontinuity
     controller.length_limit = controller.length_limit * APPROACH
-    busy = ctx.implicit.busy if implicit else BUSY
-    factor = as_iterations_allow(factor, busy, iterations, abs(h), controller.length_limit)
+    target = ctx.implicit.target_corrections if implicit else TARGET_ITERATIONS
+    factor = as_iterations_allow(factor, target, iterations, abs(h), controller.length_limit)
     if implicit and 1.0 < factor < STEADY:
         factor = 1.0
     elif implicit == 0 and ctx.implicit.strategy != FIXED_POINT:
-        watch(ctx, factor)
+        count_limited_steps(ctx, factor)
     length = h * (factor if implicit else on_table(ctx, factor))
     if ctx.estimate.blind and abs(length) > controller.longest_blind:
         length = controller.longest_blind if h > 0.0 else -controller.longest_blind
