@@ -310,7 +310,7 @@ class AdaptiveStepper(HBVMStepper):
 
     def _budget(self, most: int | None = None) -> int:
         """Return how many of ``most`` steps the kernel may take at a time, and of those left."""
-        most = min(self._watch.patience if most is None else most, self._pace.steps)
+        most = min(self._watch.steps_to_next_look if most is None else most, self._pace.steps)
         if self._max_steps is None:
             return most
         return max(0, min(most, self._max_steps - self._taken))

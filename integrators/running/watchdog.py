@@ -5,11 +5,11 @@ from typing import Protocol
 
 from integrators.protocol import Destination
 
-CRAWL_STEPS = 200_000
+STALL_STEPS = 200_000
 """Steps after which a method must have got somewhere."""
 
-CRAWL_SHARE = 1e-7
-"""A method that covers less than this share of the way in `CRAWL_STEPS` steps has stalled."""
+STALL_SHARE = 1e-7
+"""A method that covers less than this share of the way in `STALL_STEPS` steps has stalled."""
 
 SMALL_SHARE, SLOWER = 2e-5, 1e-4
 """So has one that covers less than this share, 1e10 steps for all, and this part of its mean until then."""
@@ -27,13 +27,13 @@ STEADY = 0.7
 """Part of the last share that the next is at least where a solution blows up."""
 
 
-def collapsed(way: float, left: float, before: float, steps: float) -> bool:
+def makes_no_progress(way: float, left: float, before: float, steps: float) -> bool:
     """Whether a method no longer gets anywhere.
 
     Parameters
     ----------
     way : float
-        What its last `CRAWL_STEPS` steps covered, >= 0.
+        What its last `STALL_STEPS` steps covered, >= 0.
     left : float
         The way to the end from where they began.
     before : float
@@ -41,9 +41,9 @@ def collapsed(way: float, left: float, before: float, steps: float) -> bool:
     steps : float
         How many steps that took.
     """
-    if way < CRAWL_SHARE * left:
+    if way < STALL_SHARE * left:
         return True
-    return way < SMALL_SHARE * left and way * steps < SLOWER * before * CRAWL_STEPS
+    return way < SMALL_SHARE * left and way * steps < SLOWER * before * STALL_STEPS
 
 
 class StallDetector:
@@ -70,7 +70,7 @@ class StallDetector:
         self._end = end
 
     @property
-    def patience(self) -> int:
+    def steps_to_next_look(self) -> int:
         """Steps to take before the next look."""
         return min(max(self._look - self._total, 1), LONGEST_WITHOUT_A_LOOK)
 
@@ -86,10 +86,12 @@ class StallDetector:
         self._count += steps
         if self._total >= self._look and (reason := self._blows_up(t, size)):
             return reason
-        if self._count < CRAWL_STEPS:
+        if self._count < STALL_STEPS:
             return ""
         mark, self._mark, count, self._count = self._mark, t, self._count, 0
-        if not collapsed(abs(t - mark), abs(self._end - mark), abs(mark - self._start), self._total - count):
+        if not makes_no_progress(
+            abs(t - mark), abs(self._end - mark), abs(mark - self._start), self._total - count
+        ):
             return ""
         return f"{count} steps from t = {mark!r} only came to t = {t!r}: the steps have collapsed."
 

@@ -36,10 +36,10 @@ from integrators.kernel.step.vary import (
     within,
 )
 from integrators.running import watchdog
-from integrators.running.watchdog import CRAWL_STEPS
+from integrators.running.watchdog import STALL_STEPS
 
 group_at = view(Group)
-collapsed = compiled(watchdog.collapsed)
+makes_no_progress = compiled(watchdog.makes_no_progress)
 
 
 @compiled
@@ -105,7 +105,7 @@ def aim(group, lane):
     group.stop[lane] = ctx.controller.stop
     suspect = ctx.controller.attempts > 0 or is_near_discontinuity(ctx, h)
     first = ctx.controller.length_behind == 0.0 or h != ctx.controller.next_length
-    group.unwatched[lane] = 0.0 if suspect or first else float(CRAWL_STEPS - ctx.counters.steps % CRAWL_STEPS)
+    group.unwatched[lane] = 0.0 if suspect or first else float(STALL_STEPS - ctx.counters.steps % STALL_STEPS)
     group.since[lane] = 0.0
     return 1
 
@@ -194,7 +194,7 @@ def step(group, lane, ctx):
 def leave_if_slow(group, lane, ctx):
     """Let a trajectory leave its lane where it needs another solver, vanishes, or does not get anywhere."""
     if group.member[lane] >= 0 and (
-        ctx.implicit.slow >= LIMITED_STEPS or vanishes(ctx) or crawls(group, lane, ctx)
+        ctx.implicit.slow >= LIMITED_STEPS or vanishes(ctx) or has_stalled(group, lane, ctx)
     ):
         unload(group, lane, LEFT)
 
@@ -209,14 +209,14 @@ def vanishes(ctx):
 
 
 @compiled
-def crawls(group, lane, ctx):
+def has_stalled(group, lane, ctx):
     """Whether a trajectory does not get anywhere; see `integrators.running.watchdog`."""
-    if ctx.counters.steps % CRAWL_STEPS:
+    if ctx.counters.steps % STALL_STEPS:
         return False
     mark = group.mark[lane]
     group.mark[lane] = ctx.t0
     way, left = abs(ctx.t0 - mark), abs(group.times[group.count - 1] - mark)
-    return collapsed(way, left, abs(mark - group.start_time), ctx.counters.steps - CRAWL_STEPS)
+    return makes_no_progress(way, left, abs(mark - group.start_time), ctx.counters.steps - STALL_STEPS)
 
 
 @compiled

@@ -79,8 +79,8 @@ MOST_ATTEMPTS = 24
 # From rest, by its own size, a block may follow the steps of the field's rounding: no step fails, and
 # there are many. So what the blocks will reach is asked for now and then where steps are cut to less
 # than such a part of the interval.
-CRAWL = 1e-4
-CRAWL_STEPS, CRAWL_LOOKS = 256, 32
+STALL_PART = 1e-4
+STALL_CHECK_EVERY, STALL_CHECKS = 256, 32
 STEADY = 1.2  # an implicit step that could be longer by less keeps its length, and so the factors
 
 
@@ -275,7 +275,9 @@ def ready(ctx):
                 or controller.attempts >= MOST_ATTEMPTS
                 or abs(h) < SHORTEST_PART * controller.interval
             )
-            if hopeless or (controller.attempts > 1 and controller.longest < INFINITY and crawls(ctx, h)):
+            if hopeless or (
+                controller.attempts > 1 and controller.longest < INFINITY and may_have_stalled(ctx, h)
+            ):
                 ctx.length = 0.0
                 return UNSCALED
         if too_short:
@@ -308,12 +310,12 @@ def solve_at_pace(ctx):
 
 
 @compiled
-def crawls(ctx, h):
+def may_have_stalled(ctx, h):
     """Whether steps are so short after many that the field's rounding may be what cuts them."""
     return (
-        abs(h) < CRAWL * ctx.controller.interval
-        and ctx.counters.steps >= CRAWL_STEPS
-        and ctx.counters.steps % CRAWL_STEPS < CRAWL_LOOKS
+        abs(h) < STALL_PART * ctx.controller.interval
+        and ctx.counters.steps >= STALL_CHECK_EVERY
+        and ctx.counters.steps % STALL_CHECK_EVERY < STALL_CHECKS
     )
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from integrators.peers import load
 from integrators.protocol import Array, MethodBase, Status
-from integrators.running.watchdog import CRAWL_STEPS, StallDetector, stall_detector
+from integrators.running.watchdog import STALL_STEPS, StallDetector, stall_detector
 from integrators.stepping import FixedStepper, ProgramBase, RestorableStepper, StepperBase
 from problems.errors import InputError
 from problems.problem import System
@@ -234,8 +234,8 @@ class AdaptiveStepper(RestorableStepper):
         """Solve from ``t`` to ``end``, a limited number of steps at a time; note a failure."""
         code = self._program.solve.LIMIT
         while code == self._program.solve.LIMIT and t != end:
-            t, y, code = self._advance(t, y, end, CRAWL_STEPS)
-            if code == self._program.solve.LIMIT and (stalled := watch.update(t, CRAWL_STEPS)):
+            t, y, code = self._advance(t, y, end, STALL_STEPS)
+            if code == self._program.solve.LIMIT and (stalled := watch.update(t, STALL_STEPS)):
                 self._fail(Status.STALLED, t, y, stalled)
             if self._status.failed:
                 return t, y

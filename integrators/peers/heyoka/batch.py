@@ -12,7 +12,7 @@ from integrators.peers import load
 from integrators.protocol import Array, Status, Trajectories
 from integrators.refusals import check_batch, check_times
 from integrators.running.times import Counts
-from integrators.running.watchdog import CRAWL_STEPS, StallDetector
+from integrators.running.watchdog import STALL_STEPS, StallDetector
 from problems import emit
 from problems.systems.base import System
 
@@ -81,7 +81,7 @@ class Lanes:
                 par[:] = values[first // size][: len(par)]
             for place, t, all_there in ends:
                 if t != t0:
-                    ta.propagate_until(all_there, max_steps=CRAWL_STEPS)
+                    ta.propagate_until(all_there, max_steps=STALL_STEPS)
                     if now.tolist() != all_there:
                         self._one_by_one(result, np.arange(first, min(first + size, n)), place, t0)
                         break
@@ -114,7 +114,7 @@ class Lanes:
     def _propagate(self, time: float) -> Array:
         """Propagate all lanes towards a time; return the times from which they went."""
         before = self._ta.time.copy()
-        self._ta.propagate_until(np.full(self.size, time), max_steps=CRAWL_STEPS)
+        self._ta.propagate_until(np.full(self.size, time), max_steps=STALL_STEPS)
         return before
 
     def _towards(

@@ -19,7 +19,7 @@ from integrators.peers import UNTRACED, load
 from integrators.peers.heyoka.batch import Lanes
 from integrators.peers.heyoka.events import TaylorSearch, heyoka_events
 from integrators.protocol import Array, MethodBase, Status, Trajectories
-from integrators.running.watchdog import CRAWL_STEPS, stall_detector
+from integrators.running.watchdog import STALL_STEPS, stall_detector
 from integrators.stepping import ProgramBase, RestorableStepper
 from problems.problem import Problem, System
 
@@ -356,7 +356,7 @@ class TaylorStepper(RestorableStepper):
         """Go to ``t`` by a shortened last step; return whether that succeeded."""
         watch = stall_detector(self, self._ta.time, t)
         few = self.search is not None and self.search.terminates
-        most = STEPS_BEYOND if few else CRAWL_STEPS
+        most = STEPS_BEYOND if few else STALL_STEPS
         while True:
             before = self._ta.time
             outcome, _, _, steps, *_ = self._ta.propagate_until(t, max_steps=most, write_tc=write_tc)

@@ -8,7 +8,7 @@ import numpy as np
 
 from integrators.peers.rebound.program import Layout, ReboundMethod, ReboundProgram, calls
 from integrators.protocol import Array, Status
-from integrators.running.watchdog import CRAWL_STEPS
+from integrators.running.watchdog import STALL_STEPS
 from integrators.stepping import StepperBase
 
 
@@ -75,7 +75,7 @@ class AdaptiveStepper(StepperBase):
             still = f"time stood still at t = {t!r} for {hooks.FROZEN} steps"
             self._ended(Status.STALLED, f"{fell} {still}; {stopped}.")
         else:
-            still = f"{CRAWL_STEPS} steps came no nearer to t = {end!r} than t = {t!r}"
+            still = f"{STALL_STEPS} steps came no nearer to t = {end!r} than t = {t!r}"
             self._ended(Status.STALLED, f"{fell} {still}; {stopped}.")
 
     def _ended(self, status: Status, reason: str) -> None:

@@ -32,7 +32,7 @@ REASON, EVALUATIONS, LAST, STILL, MARK, MARKED, START, STARTED, END, SEEN, NUMBE
 BLOCK = RECORD + 2 * RING
 
 # Why the watchdog stopped a simulation.
-GOING, STANDS, CRAWLS, NAN = range(4)
+GOING, STANDS, STALLED, NAN = range(4)
 
 
 class Block:
@@ -75,7 +75,7 @@ def _pointer_of(typingctx: Any, address: Any) -> Any:
 
 
 _pointer: Any = intrinsic(_pointer_of)
-_collapsed: Any = numba.njit(rules.collapsed)
+_makes_no_progress: Any = numba.njit(rules.makes_no_progress)
 
 
 def _offset(field: str, size: int) -> int:
@@ -91,7 +91,7 @@ def watchdog() -> Any:
     T, DT, DONE = _offset("t", 8), _offset("dt", 8), _offset("dt_last_done", 8)
     STEPS, EXTRAS, STATUS = _offset("steps_done", 8), _offset("extras", 8), _offset("_status", 4)
     # numba's cache of compiled code sees a change of these, but not of another module's constants.
-    constants = rules.CRAWL_STEPS, rules.CRAWL_SHARE, rules.SMALL_SHARE, rules.SLOWER
+    constants = rules.STALL_STEPS, rules.STALL_SHARE, rules.SMALL_SHARE, rules.SLOWER
 
     @numba.cfunc(types.void(types.voidptr), cache=True)
     def watch(simulation: Any) -> None:
@@ -119,8 +119,8 @@ def watchdog() -> Any:
         if steps - block[MARKED] >= constants[0]:
             way, left = abs(t - block[MARK]), abs(block[END] - block[MARK])
             before = abs(block[MARK] - block[START])
-            if _collapsed(way, left, before, block[MARKED] - block[STARTED]):
-                reason = CRAWLS
+            if _makes_no_progress(way, left, before, block[MARKED] - block[STARTED]):
+                reason = STALLED
             block[MARK] = t
             block[MARKED] = steps
         if reason != GOING:

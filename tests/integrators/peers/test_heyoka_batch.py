@@ -98,7 +98,7 @@ def test_the_others_reach_every_time_after_one_met_a_pole(dead):
 
 def test_a_trajectory_that_crawls_is_stalled_and_the_others_finish(monkeypatch):
     for module in ("integrators.running.watchdog", "integrators.peers.heyoka.batch"):
-        monkeypatch.setattr(f"{module}.CRAWL_STEPS", 500)  # 200,000 take seconds
+        monkeypatch.setattr(f"{module}.STALL_STEPS", 500)  # 200,000 take seconds
     system = VectorField(
         lambda y, par, m: [m.cos(par.rate * y[1]) * par.rate, 1.0], dim=2, parameters={"rate": 1.0}
     )

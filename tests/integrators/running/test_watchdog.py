@@ -4,7 +4,7 @@ import pytest
 
 import problems
 from integrators import HBVM, Status, integrate, integrate_many
-from integrators.running.watchdog import CRAWL_STEPS, collapsed
+from integrators.running.watchdog import STALL_STEPS, makes_no_progress
 
 
 def slow_then_fast(t_end=1e5):
@@ -18,16 +18,16 @@ def slow_then_fast(t_end=1e5):
 
 
 def test_the_way_is_compared_with_the_end_and_with_the_mean_until_then():
-    assert collapsed(way=9e-8, left=1.0, before=0.0, steps=0)
-    assert not collapsed(way=1.1e-7, left=1.0, before=0.0, steps=0)
+    assert makes_no_progress(way=9e-8, left=1.0, before=0.0, steps=0)
+    assert not makes_no_progress(way=1.1e-7, left=1.0, before=0.0, steps=0)
     # A million steps of 1e-6 came to 1; 200,000 steps of the same length cover 0.2.
-    assert collapsed(way=1.9e-5, left=1.0, before=1.0, steps=10**6)
-    assert not collapsed(way=2.1e-5, left=1.0, before=1.0, steps=10**6)
-    assert not collapsed(way=1.9e-5, left=1.0, before=1.8e-1, steps=CRAWL_STEPS)
+    assert makes_no_progress(way=1.9e-5, left=1.0, before=1.0, steps=10**6)
+    assert not makes_no_progress(way=2.1e-5, left=1.0, before=1.0, steps=10**6)
+    assert not makes_no_progress(way=1.9e-5, left=1.0, before=1.8e-1, steps=STALL_STEPS)
 
 
 def test_steps_that_collapse_on_the_way_are_a_status(monkeypatch):
-    monkeypatch.setattr("integrators.running.watchdog.CRAWL_STEPS", 8000)
+    monkeypatch.setattr("integrators.running.watchdog.STALL_STEPS", 8000)
     solution = integrate(slow_then_fast(), HBVM())  # before: for ever, 1e-7 of the way in 200,000 steps
     assert solution.status is Status.STALLED
     assert "the steps have collapsed" in solution.reason

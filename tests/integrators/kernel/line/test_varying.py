@@ -128,7 +128,7 @@ def test_steps_do_not_outgrow_the_iteration_where_fast_modes_are_at_rest():
 
 @pytest.mark.parametrize("sample", ["partial", "steps"])
 def test_steps_that_have_collapsed_are_a_status_with_time_and_reason(monkeypatch, sample):
-    monkeypatch.setattr("integrators.running.watchdog.CRAWL_STEPS", 8000)
+    monkeypatch.setattr("integrators.running.watchdog.STALL_STEPS", 8000)
 
     def f(t, y, m):
         return [1.0 + 0.5 * m.sin(1e9 * t), 0.0 * y[0]]
