@@ -22,7 +22,7 @@ from integrators.kernel.simd.operations import two_sum
 from integrators.kernel.step.begin import choose, prepare, rewind, set_step
 from integrators.kernel.step.finish import commit, finish
 from integrators.kernel.step.fixed_point import iterate_measured
-from integrators.kernel.step.iterate import settle, test
+from integrators.kernel.step.iterate import iterate_to_end, test
 from integrators.kernel.step.sample import write
 from integrators.kernel.step.sums import time_of_step
 
@@ -93,7 +93,7 @@ def pull(address, place):
         prepare(ctx)
         choose(ctx)
         test(ctx, iterate_measured(ctx, ctx.solver.free if ctx.solver.predicted else 0))
-        outcome = settle(ctx)
+        outcome = iterate_to_end(ctx)
         if outcome == DONE:
             outcome = finish(ctx)
         if outcome != DONE:

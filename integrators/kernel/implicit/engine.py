@@ -13,4 +13,4 @@ def _entry() -> Any:
 
 
 solver = Engine(_entry, "ctx place started", *SOURCES, "implicit")
-"""Its address is what `integrators.kernel.step.handover` calls."""
+"""Its address is what `integrators.kernel.step.solver_switch` calls."""

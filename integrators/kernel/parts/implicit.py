@@ -8,7 +8,7 @@ NOT_WANTED, FOR_STEPS, FOR_VECTORS = range(3)
 
 
 class Implicit(Part):
-    """The implicit solver beside the fixed-point iteration; see `step.handover`."""
+    """The implicit solver beside the fixed-point iteration; see `step.solver_switch`."""
 
     strategy = Integer()  # FIXED_POINT, AUTO, ALWAYS_IMPLICIT
     code = Integer()  # address of int64(context, memory, started); 0: not there yet

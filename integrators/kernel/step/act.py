@@ -13,7 +13,7 @@ from integrators.kernel.step.anew import begin_anew
 from integrators.kernel.step.begin import begin
 from integrators.kernel.step.control import is_distinct
 from integrators.kernel.step.finish import commit, finish
-from integrators.kernel.step.iterate import settle
+from integrators.kernel.step.iterate import iterate_to_end
 from integrators.kernel.step.vary import attempt, take
 
 ONWARD = 1.25  # times that are probably enough to see the next one
@@ -71,7 +71,7 @@ def insist(ctx):
     """Iterate as long as it takes on a step that `attempt` has given up where a shorter one is cheaper."""
     ctx.length = 0.0
     begin(ctx)
-    outcome = settle(ctx)
+    outcome = iterate_to_end(ctx)
     return finish(ctx) if outcome == DONE else outcome
 
 

@@ -14,8 +14,8 @@ from integrators.kernel.simd.memory import call_follow, call_look
 from integrators.kernel.step.begin import begin
 from integrators.kernel.step.finish import commit, finish
 from integrators.kernel.step.fixed_point import iterate_measured
-from integrators.kernel.step.handover import reconsider, solve_implicitly
-from integrators.kernel.step.iterate import settle, test
+from integrators.kernel.step.iterate import iterate_to_end, test
+from integrators.kernel.step.solver_switch import solve_implicitly, switch_if_slow
 
 
 @compiled
@@ -27,7 +27,7 @@ def solve(ctx):
         return solve_implicitly(ctx, ctx, 0)
     begin(ctx)
     test(ctx, iterate_measured(ctx, ctx.solver.free if ctx.solver.predicted else 0))
-    return reconsider(ctx, settle(ctx))
+    return switch_if_slow(ctx, iterate_to_end(ctx))
 
 
 @compiled

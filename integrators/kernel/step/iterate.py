@@ -57,7 +57,7 @@ def extra_iterations(ctx, change):
 
 
 @compiled
-def settle(ctx):
+def iterate_to_end(ctx):
     """Iterate with tests until the step is solved or has failed; return the outcome."""
     while ctx.solver.outcome == RUNNING:
         test(ctx, iterate_measured(ctx, 0))

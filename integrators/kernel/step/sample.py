@@ -9,8 +9,8 @@ from integrators.kernel.step.discontinuities import keep_end_of_part
 from integrators.kernel.step.estimate import ALIKE
 from integrators.kernel.step.finish import arrive, finish
 from integrators.kernel.step.fixed_point import project
-from integrators.kernel.step.handover import settle_part
 from integrators.kernel.step.size import take_sizes
+from integrators.kernel.step.solver_switch import solve_part
 from integrators.kernel.step.sums import time_of_step
 
 
@@ -130,7 +130,7 @@ def part_step(ctx, partial, part, known):
     take_sizes(partial)
     # Not that of another partial step: states depend on nothing but where they are.
     partial.solver.rate = ctx.solver.rate
-    outcome = settle_part(ctx, partial)
+    outcome = solve_part(ctx, partial)
     return finish(partial) if outcome == DONE else outcome
 
 

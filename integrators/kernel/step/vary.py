@@ -46,10 +46,10 @@ from integrators.kernel.step.estimate import estimate, estimate_implicit, log_de
 from integrators.kernel.step.finish import count_step, finish
 from integrators.kernel.step.fixed_point import iterate_measured
 from integrators.kernel.step.graze import grazes
-from integrators.kernel.step.handover import solve_implicitly, want_solver
-from integrators.kernel.step.iterate import close, extra_iterations, settle, test
+from integrators.kernel.step.iterate import close, extra_iterations, iterate_to_end, test
 from integrators.kernel.step.reversible import keep_pace
 from integrators.kernel.step.rule import FARTHEST, FIRST_RATE, ROUNDING, SCALE_LASTS, SHORTEST_PART
+from integrators.kernel.step.solver_switch import request_solver, solve_implicitly
 from integrators.kernel.step.stopping import rate_since, rate_unseen, takes_too_long, untested
 from integrators.kernel.step.sums import time_after
 from integrators.kernel.step.surfaces import AGAIN, REACHED, leave, locate, look_across
@@ -108,7 +108,7 @@ def iterate(ctx):
     test(ctx, iterate_measured(ctx, 0))
     tried = solver.tried
     if solver.outcome != RUNNING or tried != 1:
-        return settle(ctx)
+        return iterate_to_end(ctx)
     first, known = binary_log(solver.last), solver.rate
     rate = known
     change = first
@@ -124,7 +124,7 @@ def iterate(ctx):
         solver.rate = rate
         test(ctx, moved)
         if solver.tried <= tried:  # started anew
-            return settle(ctx)
+            return iterate_to_end(ctx)
         if solver.outcome == RUNNING:
             if moved <= trusted:
                 extra_iterations(ctx, moved)
@@ -187,7 +187,7 @@ def count_limited_steps(ctx, factor):
 
 
 @compiled
-def take_over(ctx):
+def switch_to_implicit(ctx):
     """Put the implicit solver to work."""
     implicit = ctx.implicit
     implicit.left = LEAST_IMPLICIT_STEPS
@@ -198,7 +198,7 @@ def take_over(ctx):
 
 
 @compiled
-def set_hold(ctx):
+def set_wait(ctx):
     """Set `Implicit.held`, the steps to wait for the implicit solver, when that has given way again.
 
     If it did so as soon as it might, steps have not become longer.
@@ -248,8 +248,8 @@ def ready(ctx):
         return solve_at_pace(ctx)
     if ctx.implicit.slow >= max(ctx.implicit.held, LIMITED_STEPS):
         if ctx.implicit.code == 0:
-            return want_solver(ctx)
-        take_over(ctx)
+            return request_solver(ctx)
+        switch_to_implicit(ctx)
     begin_attempts(ctx)
     failure = UNDERFLOW
     while True:
@@ -286,7 +286,7 @@ def ready(ctx):
         implicit = ctx.implicit.active
         outcome = attempt(ctx, h)
         if implicit and ctx.implicit.active == 0:
-            set_hold(ctx)
+            set_wait(ctx)
         ctx.solved = UNSOLVED
         if outcome == NOT_KEPT:
             return outcome

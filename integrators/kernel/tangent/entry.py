@@ -33,10 +33,10 @@ from integrators.kernel.simd.views import doubles
 from integrators.kernel.step.begin import choose, predict, prepare, rewind, set_factors, set_step
 from integrators.kernel.step.finish import commit, finish
 from integrators.kernel.step.fixed_point import iterate_measured
-from integrators.kernel.step.handover import solve_implicitly
-from integrators.kernel.step.iterate import settle, test
+from integrators.kernel.step.iterate import iterate_to_end, test
 from integrators.kernel.step.sample import copy, vectors_of_state, write
 from integrators.kernel.step.size import take_sizes
+from integrators.kernel.step.solver_switch import solve_implicitly
 from integrators.kernel.step.stages import offset
 from integrators.kernel.tangent.memory import Tangents
 
@@ -134,7 +134,7 @@ def differentiate(ctx, trajectory, vectors, earlier, part, pulls):
     else:
         choose(vectors)
     test(vectors, iterate_measured(vectors, solver.free if solver.predicted else 0))
-    outcome = settle(vectors)
+    outcome = iterate_to_end(vectors)
     if outcome == DONE:
         outcome = finish(vectors)
         if outcome == DONE and pulls != 0:
