@@ -196,7 +196,7 @@ def tables(k: int, s: int) -> Tables:
     )
 
 
-def beyond_two(k: int, modes: int) -> Array:
+def two_step_extrapolation(k: int, modes: int) -> Array:
     """Return what takes values at the k nodes of two steps to the nodes of the next one, shape (k, 2 k).
 
     By least squares over ``modes`` polynomials, 2 k at most. The longer the stretch that is known, the less

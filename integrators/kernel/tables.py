@@ -40,7 +40,8 @@ FARTHEST = 4.0  # units in the last place of its largest entry by which an entry
 
 NAMES = (
     "nodes", "nodes_low", "weights", "weights_low", "position_weights", "position_weights_low",
-    "matrix", "matrix_low", "projection", "into_modes", "beyond", "beyond_two", "basis",
+    "matrix", "matrix_low", "projection", "to_legendre", "extrapolation_basis", "two_step_extrapolation",
+    "basis",
 )  # fmt: skip
 
 
@@ -60,9 +61,9 @@ class Constants:
         Of the matrix.
     arrays : dict of str to ndarray
         ``matrix`` + ``matrix_low`` (k, k), or (k, s) on the route THROUGH; ``projection``
-        (s, k) and ``into_modes`` (modes, k) onto coefficients; ``beyond`` (k, modes), the
-        modes at the nodes of the next step; ``beyond_two`` (k, 2 k), from two steps' values to the
-        nodes of the next one, on the route of eight columns; ``basis`` (k, moments); and vectors (k,).
+        (s, k) and ``to_legendre`` (modes, k) onto coefficients; ``extrapolation_basis`` (k, modes), the
+        modes at the nodes of the next step; ``two_step_extrapolation`` (k, 2 k), from two steps' values to
+        the nodes of the next one, on the route of eight columns; ``basis`` (k, moments); and vectors (k,).
     """
 
     k: int
@@ -157,9 +158,11 @@ def _make(k: int, s: int, second: bool, route: int) -> dict[str, Array]:
         "matrix": matrix[0],
         "matrix_low": matrix[1],
         "projection": keep_moments(t.projection.hi, t.projection.lo, basis[:, : min(MOMENTS, k)]),
-        "into_modes": (basis[:, :modes] * t.weights.hi[:, None]).T,
-        "beyond": legendre.legendre(1.0 + t.nodes.hi, modes),
-        "beyond_two": legendre.beyond_two(k, MODES) if from_two(k, s, route) else np.empty((k, 0)),
+        "to_legendre": (basis[:, :modes] * t.weights.hi[:, None]).T,
+        "extrapolation_basis": legendre.legendre(1.0 + t.nodes.hi, modes),
+        "two_step_extrapolation": legendre.two_step_extrapolation(k, MODES)
+        if from_two(k, s, route)
+        else np.empty((k, 0)),
         "basis": basis[:, : min(MOMENTS, k)],
     }
 
@@ -232,20 +235,20 @@ def scaled(constants: Constants, h: float, *, squared: bool) -> dict[str, Array]
     if squared:
         high, low = times(high, low, h)
     modes = slice(MODES)
-    beyond = a["beyond"][:, modes]
+    basis = a["extrapolation_basis"][:, modes]
     if constants.route == THROUGH:
         # What rounding takes from the first columns goes into columns of its own, before
         # the others, so that a chain of products holds it before it is rounded.
         first = constants.first
         matrix = np.hstack([low[:, :first], high])
-        extrapolation = high @ a["projection"] @ beyond
+        extrapolation = high @ a["projection"] @ basis
     else:
         matrix = keep_moments(high, low, a["basis"])
-        extrapolation = high @ beyond @ a["into_modes"][modes]
+        extrapolation = high @ basis @ a["to_legendre"][modes]
     columns = constants.route if constants.route > 1 else None
     more = {}
     if constants.two_steps:
-        older, last = np.hsplit(high @ a["beyond_two"], 2)
+        older, last = np.hsplit(high @ a["two_step_extrapolation"], 2)
         parts = [packed(part, columns=columns, repeat=True) for part in (older, last)]
         more["extrapolation_two"] = joined(parts)
     return {
@@ -274,8 +277,8 @@ def extrapolations(constants: Constants) -> Array:
 
     a = constants.arrays
     nodes, modes, columns = a["nodes"].reshape(-1), constants.modes, constants.route
-    beyond = [legendre.legendre(1.0 + ratio * nodes, modes) for ratio in RATIOS]
-    matrices = [a["matrix"] @ there @ a["into_modes"] for there in beyond]
+    basis = [legendre.legendre(1.0 + ratio * nodes, modes) for ratio in RATIOS]
+    matrices = [a["matrix"] @ there @ a["to_legendre"] for there in basis]
     return joined([packed(matrix, columns=columns, repeat=True) for matrix in matrices])
 
 
@@ -290,7 +293,7 @@ def fixed(constants: Constants) -> dict[str, Array]:
     return {
         "raw_matrix": packed(raw, columns=columns, repeat=True),
         "projection": packed(projection),
-        "mode_projection": packed(a["into_modes"]),
+        "mode_projection": packed(a["to_legendre"]),
         "nodes": _vector(a["nodes"], repeat=True),
         "nodes_low": _vector(a["nodes_low"], repeat=True),
         "weights": _vector(a["weights"]),

@@ -176,7 +176,7 @@ class Control:
         """
         w, k, rows = self.w, self.w.form.k, self.w.form.rows
         table, values = (
-            w.table(Group.slots["into_modes"]),
+            w.table(Group.slots["to_legendre"]),
             [w.get(w.values, w.at(i, rows, d)) for i in range(k)],
         )
         pairs = [(values[i], values[k - 1 - i]) for i in range(k // 2)]

@@ -60,7 +60,7 @@ class Group(Memory):
     size = Array("rows", "lanes")
 
     # --- adaptive steps ---
-    into_modes = Array()  # values -> Legendre coefficients, (k, k)
+    to_legendre = Array()  # values -> Legendre coefficients, (k, k)
     ratio = Array("lanes")  # of the length to that of the step that `values` belong to; 0: none
     begin = Array("lanes")  # where on that step this one begins: at its end, 1, or at its start, 0
     next_state = Array("dim", "lanes")

@@ -20,7 +20,7 @@ from integrators.kernel.parts.discontinuities import EXTRAPOLATED
 from integrators.kernel.parts.implicit import FIXED_POINT
 from integrators.kernel.simd.memory import call_steps, put, splat8
 from integrators.kernel.step.anew import reset
-from integrators.kernel.step.begin import INFINITY, is_within_reach
+from integrators.kernel.step.begin import INFINITY, can_extrapolate
 from integrators.kernel.step.control import error_power, is_distinct, quadrature_error_power
 from integrators.kernel.step.discontinuities import end_behind, is_near_discontinuity
 from integrators.kernel.step.rule import FIRST_RATE, SMALLEST
@@ -90,7 +90,7 @@ def aim(group, lane):
         return 0
     group.h[lane], group.t0[lane], group.time_low[lane] = h, ctx.t0, ctx.time_low
     # Where the step begins and how long it is on the one whose values are there; 0: on none.
-    group.ratio[lane] = h / length if is_within_reach(h, length) else 0.0
+    group.ratio[lane] = h / length if can_extrapolate(h, length) else 0.0
     group.begin[lane] = 0.0 if ctx.controller.rejected else 1.0
     group.before[lane] = group.iterations[lane]
     group.alive[lane] = 1.0

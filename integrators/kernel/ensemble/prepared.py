@@ -87,9 +87,9 @@ class Lanes:
         """The tables that do not depend on the step."""
         a = self._constants.arrays
         names = ("nodes", "nodes_low", "weights", "weights_low", "position_weights", "position_weights_low")
-        extrapolation = a["beyond"][:, : tables.MODES] @ a["into_modes"][: tables.MODES]
+        extrapolation = a["extrapolation_basis"][:, : tables.MODES] @ a["to_legendre"][: tables.MODES]
         chosen = {name: a[name] for name in names} | {"extrapolation": extrapolation}
-        chosen["into_modes"] = a["into_modes"]
+        chosen["to_legendre"] = a["to_legendre"]
         return {name: _aligned(values) for name, values in chosen.items()}
 
     def _matrix(self, h: float) -> Numbers:
@@ -116,7 +116,7 @@ class Lanes:
             "parts": parts,
             "part_places": places.astype(np.int64),
             "part_matrix": np.ascontiguousarray(matrix),
-            "part_extrapolation": np.ascontiguousarray(basis @ a["into_modes"][:modes]),
+            "part_extrapolation": np.ascontiguousarray(basis @ a["to_legendre"][:modes]),
             "part_reach": _reach(matrix),
         }
 

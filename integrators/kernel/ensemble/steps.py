@@ -351,7 +351,7 @@ class Steps(Writer):
         """First values: the last step's polynomial at the nodes of this one."""
         k, rows = self.form.k, self.form.rows
         if self.form.varying:
-            self.predict_elsewhere()
+            self.predict_from_polynomial()
             return
         table = self.table(Group.slots["extrapolation"])
 
@@ -367,7 +367,7 @@ class Steps(Writer):
         self.each(k, stage)
         self.each(k * rows, lambda i: self.put(self.get(self.ahead, i), self.values, i))
 
-    def predict_elsewhere(self) -> None:
+    def predict_from_polynomial(self) -> None:
         """As `predict`, from the powers of the polynomial: this step's length may be another one."""
         from integrators.kernel.step.begin import behind  # imports numba
 

@@ -119,14 +119,14 @@ def extremum_around(ctx, search, i, j, way):
     return extremum(ctx, search, search.places[max(i - 1, 0)], search.places[min(j + 1, search.n - 1)], way)
 
 
-BEYOND = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)  # of the stretch: how far beyond its end g may have a sign again
+BEYOND_END = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)  # of the stretch: how far beyond its end g may have a sign again
 
 
 @compiled
 def direction_at_end(ctx, search, before):
     """Return the direction of a zero at the very end: by the sign of the function just beyond it."""
     raised, after = search.raised, 0
-    for distance in BEYOND:
+    for distance in BEYOND_END:
         x = 1.0 + max(distance, 100.0 * search.resolution)
         value = value_at(ctx, search, x)
         if abs(value) > noise_at(ctx, search, x):

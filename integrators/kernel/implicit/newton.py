@@ -19,7 +19,7 @@ from integrators.kernel.implicit.stages import (
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.parts.implicit import AUTO
 from integrators.kernel.simd.memory import get, largest, put, splat8, spread
-from integrators.kernel.step.begin import INFINITY, prepare, start_elsewhere
+from integrators.kernel.step.begin import INFINITY, prepare, start_from_polynomial
 from integrators.kernel.step.rule import FARTHEST, STAGNATION
 from integrators.kernel.step.stopping import is_rounding
 
@@ -165,7 +165,7 @@ def solve_step(ctx, m, started):
         length = ctx.length
         solver.predicted = 0
         if length != 0.0 and abs(h / length) <= FARTHEST:
-            start_elsewhere(ctx, ctx, 0.0 if ctx.controller.rejected else 1.0, h / length)
+            start_from_polynomial(ctx, ctx, 0.0 if ctx.controller.rejected else 1.0, h / length)
     set_factor(ctx, m)
     extrapolated = solver.predicted
     if extrapolated:

@@ -260,9 +260,9 @@ class Workspace(Memory):
         self._find_factors()
 
     def _find_factors(self) -> None:
-        self.elsewhere = None if self.lu_rows else Factors(self, self._values)
+        self.external_factors = None if self.lu_rows else Factors(self, self._values)
         """What keeps the factors, where they are not dense and small."""
-        self.factors = 0 if self.elsewhere is None else self.elsewhere.address
+        self.factors = 0 if self.external_factors is None else self.external_factors.address
 
     def along(self, shape: Shape, padded: int, pulls: int) -> "Workspace":
         """Return memory for tangent vectors along the trajectory that this is the memory of.
@@ -312,8 +312,8 @@ class Workspace(Memory):
 
     def raise_what_is_no_failure(self) -> None:
         """Raise what stopped a factorization, unless that is a singular matrix: Ctrl-C, no memory left."""
-        if self.elsewhere is not None and self.elsewhere.error is not None:
-            error, self.elsewhere.error = self.elsewhere.error, None
+        if self.external_factors is not None and self.external_factors.error is not None:
+            error, self.external_factors.error = self.external_factors.error, None
             if not isinstance(error, (ArithmeticError, RuntimeError, ValueError)):
                 raise error
 

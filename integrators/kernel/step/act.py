@@ -16,7 +16,7 @@ from integrators.kernel.step.finish import commit, finish
 from integrators.kernel.step.iterate import iterate_to_end
 from integrators.kernel.step.vary import attempt, take
 
-ONWARD = 1.25  # times that are probably enough to see the next one
+GROWTH_AFTER_ACTION = 1.25  # times that are probably enough to see the next one
 
 
 @compiled
@@ -124,7 +124,7 @@ def length_after_action(ctx):
     Beyond the next one a field may be another one, and what happens before is a small part of a long step.
     """
     events = ctx.events
-    length, since = events.length_before, ONWARD * (ctx.t0 - events.acted)
+    length, since = events.length_before, GROWTH_AFTER_ACTION * (ctx.t0 - events.acted)
     return since if abs(since) < abs(length) else length
 
 

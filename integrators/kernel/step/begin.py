@@ -139,7 +139,7 @@ def next_polynomial(a, b, x, here, before):
 
 
 @compiled
-def start_elsewhere(ctx, source, first, ratio):
+def start_from_polynomial(ctx, source, first, ratio):
     """First stages from the values of the context ``source``; there the nodes are ``first + ratio * c``."""
     tables = ctx.tables
     rows, chunks, groups = ctx.rows, ctx.chunks, tables.mode_groups
@@ -173,7 +173,7 @@ def ratio_at(place):
 
 
 @compiled
-def on_table(ctx, ratio):
+def tabulated_ratio(ctx, ratio):
     """Return the next smaller ratio of lengths that there is a table for; the ratio itself without tables.
 
     A larger one would make a third more of an error of order 29, and steps be rejected.
@@ -182,7 +182,7 @@ def on_table(ctx, ratio):
 
 
 @compiled
-def start_onward(ctx):
+def start_from_table(ctx):
     """First stages from the values of the step before by a table, if there is one; return whether."""
     if ctx.length == 0.0 or ctx.controller.rejected or ctx.route <= THROUGH:
         return False
@@ -198,7 +198,7 @@ def start_onward(ctx):
 
 
 @compiled
-def is_within_reach(h, length):
+def can_extrapolate(h, length):
     """Whether first stages of a step of length h may come from a step of ``length``; 0: there is none."""
     return length != 0.0 and abs(h / length) <= FARTHEST
 
@@ -216,8 +216,8 @@ def predict(ctx, source, length, first):
     first : float
         Where this step begins on it: at its end, 1, or at its start, 0.
     """
-    if is_within_reach(ctx.h, length):
-        start_elsewhere(ctx, source, first, ctx.h / length)
+    if can_extrapolate(ctx.h, length):
+        start_from_polynomial(ctx, source, first, ctx.h / length)
     else:
         start_plain(ctx)
 
@@ -246,7 +246,7 @@ def choose(ctx):
         start_extrapolated(ctx)
         ctx.older_length = ctx.h
         ctx.values, ctx.older_values = ctx.older_values, ctx.values
-    elif not (ctx.varying and start_onward(ctx)):
+    elif not (ctx.varying and start_from_table(ctx)):
         ctx.older_length = 0.0
         predict(ctx, ctx, ctx.length, 0.0 if ctx.controller.rejected else 1.0)
     ctx.blocks.age -= 1

@@ -73,7 +73,7 @@ def take_coefficients(ctx):
 
 
 @compiled
-def of_two(table, which, low, high):
+def coefficient_of_two(table, which, low, high):
     """As `coefficient`, of two times eight values."""
     return fma(get(table, 16 * which + 8), high, get(table, 16 * which) * low)
 
@@ -85,16 +85,16 @@ def take_coefficients_of_two(ctx):
     for d in range(ctx.rows):
         x, y = get(values, 16 * d), get(values, 16 * d + 8)
         low = (
-            of_two(table, GAMMA_0, x, y),
-            of_two(table, GAMMA_1, x, y),
-            of_two(table, GAMMA_2, x, y),
-            of_two(table, GAMMA_3, x, y),
+            coefficient_of_two(table, GAMMA_0, x, y),
+            coefficient_of_two(table, GAMMA_1, x, y),
+            coefficient_of_two(table, GAMMA_2, x, y),
+            coefficient_of_two(table, GAMMA_3, x, y),
         )
         high = (
-            of_two(table, BEFORE_ERROR, x, y),
-            of_two(table, AT_ERROR, x, y),
-            of_two(table, BEFORE_LAST, x, y),
-            of_two(table, LAST, x, y),
+            coefficient_of_two(table, BEFORE_ERROR, x, y),
+            coefficient_of_two(table, AT_ERROR, x, y),
+            coefficient_of_two(table, BEFORE_LAST, x, y),
+            coefficient_of_two(table, LAST, x, y),
         )
         put(gammas, 8 * d, abs(sums(*low, *high)))
 
@@ -134,7 +134,7 @@ def compare_ends(ctx):
     for d in range(ctx.rows):
         if two:
             x, y = get(values, 16 * d), get(values, 16 * d + 8)
-            start, end = of_two(table, AT_START, x, y), of_two(table, AT_END, x, y)
+            start, end = coefficient_of_two(table, AT_START, x, y), coefficient_of_two(table, AT_END, x, y)
         else:
             start, end = coefficient(ctx, d, AT_START), coefficient(ctx, d, AT_END)
         put(boundary_values, 8 * d, end)

@@ -20,7 +20,7 @@ from integrators.kernel.step.sample import interpolate
 ORDINARY, AGAIN, REACHED = range(3)
 
 MOST_TRIALS = 16  # of lengths of a step
-BEYOND = 1.25  # of a step is as far as its polynomial is trusted
+MOST_EXTRAPOLATED = 1.25  # of a step is as far as its polynomial is trusted
 SECANTS = 12  # evaluations of a distance
 ON_SURFACE = 2.0**-50  # part of a step that its end may be from the surface,
 # or so much, if it has become less by no more than this: then rounding has it
@@ -197,12 +197,16 @@ def part_to_surface(ctx):
         move = value * (at - before) / decrease
         if not is_number(move):
             return 0.0
-        after = min(max(at + move, 0.5), BEYOND)
+        after = min(max(at + move, 0.5), MOST_EXTRAPOLATED)
         if after == at:
             break
         before, value_before = at, value
         at, value = after, distance_at(ctx, after, here)
-    return at if is_number(value) and at > 0.5 and not (at == BEYOND and value > value_before) else 0.0
+    return (
+        at
+        if is_number(value) and at > 0.5 and not (at == MOST_EXTRAPOLATED and value > value_before)
+        else 0.0
+    )
 
 
 @compiled

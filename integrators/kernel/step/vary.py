@@ -22,7 +22,7 @@ from integrators.kernel.parts.discontinuities import NOTHING, START
 from integrators.kernel.parts.implicit import FIXED_POINT
 from integrators.kernel.parts.surfaces import AT_STEP_END, END_ACROSS, NO_SURFACE
 from integrators.kernel.simd.operations import binary_log, least
-from integrators.kernel.step.begin import INFINITY, begin, on_table, set_step
+from integrators.kernel.step.begin import INFINITY, begin, set_step, tabulated_ratio
 from integrators.kernel.step.control import (
     APPROACH,
     RETREAT,
@@ -416,7 +416,7 @@ def follow(ctx, factor, iterations, implicit):
         factor = 1.0
     elif implicit == 0 and ctx.implicit.strategy != FIXED_POINT:
         count_limited_steps(ctx, factor)
-    length = h * (factor if implicit else on_table(ctx, factor))
+    length = h * (factor if implicit else tabulated_ratio(ctx, factor))
     if ctx.estimate.blind and abs(length) > controller.longest_blind:
         length = controller.longest_blind if h > 0.0 else -controller.longest_blind
     controller.length_after = length

@@ -150,14 +150,14 @@ def _fail(simulation: int, code: int) -> None:
 def _make_table(k: int, s: int) -> np.ndarray:
     t = tables(k, s)
     vectors = (t.nodes, t.weights, t.position_weights)
-    into_modes = (legendre(t.nodes.hi, min(k, MODES)) * t.weights.hi[:, None]).T
+    to_legendre = (legendre(t.nodes.hi, min(k, MODES)) * t.weights.hi[:, None]).T
     return np.ascontiguousarray(
         np.vstack(
             [
                 *(part for vector in vectors for part in (vector.hi, vector.lo)),
                 _product(t.double_integrals, t.projection),
                 _product(t.integrals, t.projection),
-                into_modes,
+                to_legendre,
             ]
         )
     )

@@ -48,7 +48,7 @@ TINY = 1e-300
 HALF_UNIT = 2.3e-16  # what an addition rounds off is no more than half of this, relative
 
 # Rows of the table of a method, shape (6 + 2 k + modes, k): six vectors, and after them the matrices of
-# `for_positions`, `for_velocities` and `into_modes`.
+# `for_positions`, `for_velocities` and `to_legendre`.
 NODES, NODES_LOW, WEIGHTS, WEIGHTS_LOW, POSITION_WEIGHTS, POSITION_WEIGHTS_LOW = range(6)
 VECTORS = 6
 
@@ -87,7 +87,7 @@ def for_velocities(table):
 
 
 @compiled
-def into_modes(table):
+def to_legendre(table):
     """Return what gives Legendre coefficients from values at the nodes, shape (modes, k)."""
     return table[VECTORS + 2 * table.shape[1] :]
 
@@ -143,17 +143,17 @@ def velocities(table, h, v, rest, forces, out):
 
 
 @compiled
-def extrapolate(ratio, nodes, into_modes, forces, out, weights):
+def extrapolate(ratio, nodes, to_legendre, forces, out, weights):
     """Set out[l] = the previous step's polynomial through ``forces`` at 1 + ratio c_l."""
     k = forces.shape[0]
-    modes = into_modes.shape[0]
+    modes = to_legendre.shape[0]
     for i in range(k):
         x = 1.0 + 2.0 * ratio * nodes[i]  # 2c - 1 at c = 1 + ratio * c_i
         weights[:] = 0.0
         before, legendre = 0.0, 1.0
         for j in range(modes):
             for m in range(k):
-                weights[0, m] += np.sqrt(2.0 * j + 1.0) * legendre * into_modes[j, m]
+                weights[0, m] += np.sqrt(2.0 * j + 1.0) * legendre * to_legendre[j, m]
             before, legendre = legendre, ((2 * j + 1) * x * legendre - j * before) / (j + 1)
         combine(weights, 0, forces, out[i])
 
@@ -251,7 +251,7 @@ def solve(simulation, state, table, t, h, q, v, rest, forces, work, weights):
     length = reals(state, at.WORDS)[at.LENGTH]
     if length != 0.0 and 0.0 < h / length <= FARTHEST:
         copy(forces, old)
-        extrapolate(h / length, table[NODES], into_modes(table), old, forces, weights)
+        extrapolate(h / length, table[NODES], to_legendre(table), old, forces, weights)
         stages(for_positions(table), h, q, base, forces, new, row(work, SUM, k))
         if iterate(simulation, state, table, t, h, q, v, rest, forces, work):
             return True
@@ -360,7 +360,7 @@ def step(simulation, state):
         solved = solve(simulation, state, table, t, h, q, v, rest, forces, work, weights)
         if solved and most < np.inf:
             means, lasts = work[0], work[1]  # the displacements have been used
-            error = local_error(h, v, number[at.S], into_modes(table), forces, means, lasts, bodies)
+            error = local_error(h, v, number[at.S], to_legendre(table), forces, means, lasts, bodies)
             problem, solved = at.UNRESOLVED, error <= most
             wanted = SAFETY * (most / max(error, TINY)) ** (1.0 / (2 * number[at.S] + 1))
             factor = min(LONGER, max(SHORTER, wanted))

@@ -167,7 +167,7 @@ def test_rows_of_the_matrix_keep_their_moments(k, s, second, gain, h):
 def test_two_steps_are_extrapolated_exactly_as_far_as_their_values_tell(k):
     nodes = legendre.tables(k, k).nodes.hi
     known, wanted = np.concatenate([nodes, 1 + nodes]), 2 + nodes
-    table = legendre.beyond_two(k, tables.MODES)
+    table = legendre.two_step_extrapolation(k, tables.MODES)
     for degree in range(min(2 * k, tables.MODES)):
         expected = (wanted / 3) ** degree
         # Measured 3e-10, for k = 8: rounding, a million times.
