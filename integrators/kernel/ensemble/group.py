@@ -29,7 +29,7 @@ class Group(Memory):
     weights_low = Array()
     position_weights = Array()
     position_weights_low = Array()
-    reach = Real()  # the largest sum of a row of the matrix from the diagonal on, by sizes
+    matrix_norm = Real()  # the largest sum of a row of the matrix from the diagonal on, by sizes
     h = Array("lanes")
     par = Array("parameters", "lanes")
     velocity = Array("rows", "lanes")  # q' = velocity * p
@@ -107,7 +107,7 @@ class Group(Memory):
     part_places = Array(kind=int)  # where among all lengths of parts that is; for each length
     part_matrix = Array()  # (k, k): `matrix`,
     part_extrapolation = Array()  # (k, k): `extrapolation`,
-    part_reach = Array()  # and `reach`
+    part_norms = Array()  # and `matrix_norm`
     out = Array()  # (n, samples, dim)
     arrived = Array(kind=int)  # (n): LEFT, ARRIVED, ...
     all_iterations = Array(kind=int)  # (n)

@@ -79,7 +79,7 @@ def part_step(group, side, sample):
     place = group.k * group.k * length
     side.matrix = group.part_matrix + place
     side.extrapolation = group.part_extrapolation + place
-    side.reach = group.part_reach[length]
+    side.matrix_norm = group.part_norms[length]
     call_steps(side.code, side, 1)
     group.living = side.living
     for lane in range(lanes):

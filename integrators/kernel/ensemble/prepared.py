@@ -117,7 +117,7 @@ class Lanes:
             "part_places": places.astype(np.int64),
             "part_matrix": np.ascontiguousarray(matrix),
             "part_extrapolation": np.ascontiguousarray(basis @ a["to_legendre"][:modes]),
-            "part_reach": _reach(matrix),
+            "part_norms": _norm(matrix),
         }
 
     def velocities(self, par: Numbers) -> Numbers:
@@ -146,7 +146,7 @@ class Lanes:
         }  # fmt: skip
         matrix = self._matrix(h)
         group, side = (Group(shape, {**self._fixed, **arrays, "matrix": matrix}) for _ in range(2))
-        group.reach = float(_reach(matrix))
+        group.matrix_norm = float(_norm(matrix))
         group.h[:], group.t0[:] = h, t0
         group.start_time = t0
         return group, side
@@ -217,7 +217,7 @@ def compiled_lanes(make: Callable[[], Made]) -> tuple[Made | None, float]:
     return lanes_, binary.clock() - started
 
 
-def _reach(matrix: Numbers) -> Numbers:
+def _norm(matrix: Numbers) -> Numbers:
     """Return how far a change of the values moves the stages at most, for a matrix or for several.
 
     In the next iteration a stage meets the changes at itself and at those after it: the others have moved it.

@@ -278,10 +278,12 @@ class Steps(Writer):
 
         form = self.form
         least = least_part(form.varying)
-        reach = Value(self.b, splat(self.b, self.b.load(self.word(Group.slots["reach"], DOUBLE)), form.lanes))
+        matrix_norm = Value(
+            self.b, splat(self.b, self.b.load(self.word(Group.slots["matrix_norm"], DOUBLE)), form.lanes)
+        )
 
         def weight_of(d: Index) -> Value:
-            return reach if form.unit else self.get(self.factor, d).absolute() * reach
+            return matrix_norm if form.unit else self.get(self.factor, d).absolute() * matrix_norm
 
         for first, blocks, width in groups:
             tops = largest, farthest = [self.variable(self.kind, self.zero.value) for _ in range(2)]

@@ -142,11 +142,11 @@ def mark_low(ctx, search, low, way):
     x, p = search.places[low], search.fine[low]
     value = value_at(ctx, search, x)
     # Between these it may fall by as much as it rises, at a corner, which the polynomial also rounds.
-    reach = SURE * search.missing
+    margin = SURE * search.missing
     for i in range(max(low - 1, 0), min(low + 2, search.n)):
-        reach = max(reach, abs(search.fine[i] - p))
-    reach += SURE * abs(value - p)
-    if not is_finite(value) or (sign(value) == way and abs(value) > reach):
+        margin = max(margin, abs(search.fine[i] - p))
+    margin += SURE * abs(value - p)
+    if not is_finite(value) or (sign(value) == way and abs(value) > margin):
         return
     if sign(value) != -way:
         x = extremum_around(ctx, search, low, low, -way)

@@ -129,7 +129,7 @@ def full(ctx, m, above):
             for j in range(s):
                 part, row = m.moments[m.k * j + stage] * slope, width * (j * rows + r) + c
                 for i in range(s):
-                    whole[row + i * rows] -= part * m.reach[s * stage + i]
+                    whole[row + i * rows] -= part * m.force_integrals[s * stage + i]
                 x[j * rows + r] += m.moments[m.k * j + stage] * (ctx.h * m.entries[e] * known)
     m.factorizations += 1
     if not eliminate(whole, n, width, x):

@@ -149,7 +149,7 @@ class Workspace(Memory):
     basis = Array()  # coefficients -> the polynomial at the nodes
     weights = Array()  # of the stages in a mean, one per lane of stage memory
     integrals = Table("k", "s")  # the stage table
-    reach = Table("k", "s")  # the same; in the second-order form times X_s
+    force_integrals = Table("k", "s")  # the same; in the second-order form times X_s
     moments = Table("s", "k")  # the projection
     left = Array()  # rows of the inverse of the eigenvectors' matrix, eight real parts, eight imaginary ones
     right = Array()  # eigenvectors, in the same way, twice where a conjugate belongs to them
@@ -245,7 +245,7 @@ class Workspace(Memory):
             "projection": packed(c.arrays["projection"]),
             "basis": packed(m.basis, repeat=True),
             "weights": weights,
-            "integrals": m.integrals, "reach": m.integrals @ m.x if shape.second else m.integrals,
+            "integrals": m.integrals, "force_integrals": m.integrals @ m.x if shape.second else m.integrals,
             "moments": c.arrays["projection"],
             "left": packed(_in_eights(m.left)), "right": packed(_in_eights(m.right.T.conj()).T),
             "eigen": _in_eights(values), "powers": _in_eights(powers),

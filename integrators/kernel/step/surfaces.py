@@ -158,9 +158,9 @@ def first_crossing(ctx):
         change = 1 if (a < 0.0) != (b < 0.0) else 0
         if change < changes:
             continue
-        reaches = low + (high - low) * abs(a) / (abs(a) + abs(b))
-        if change > changes or reaches <= part:
-            part, changes = reaches, change
+        crossing = low + (high - low) * abs(a) / (abs(a) + abs(b))
+        if change > changes or crossing <= part:
+            part, changes = crossing, change
             surfaces.row = i
     return part if part > low else 0.5 * (low + high)
 
