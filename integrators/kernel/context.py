@@ -109,7 +109,7 @@ class Shape:
         return self.rows * (2 if self.second else 1)
 
     @cached_property
-    def places(self) -> Integers:
+    def state_indices(self) -> Integers:
         """Where the components of (q, p), or of y, are in `Context.state`."""
         if not self.second:
             return np.arange(self.rows)
@@ -219,11 +219,11 @@ class Context(Memory):
 
     def read(self) -> Numbers:
         """Return a copy of the state, as (q, p) or y; shape (dim,)."""
-        return self.state[self.shape.places]
+        return self.state[self.shape.state_indices]
 
     def write(self, y: Numbers) -> None:
         """Set the state, given as `read` returns it."""
-        self.state[self.shape.places] = y
+        self.state[self.shape.state_indices] = y
 
     def point_to(self, tables: Mapping[str, Numbers]) -> None:
         """Let it use other tables."""
@@ -232,8 +232,8 @@ class Context(Memory):
     @property
     def used_tables(self) -> dict[str, Numbers]:
         """The tables of coefficients that it points to."""
-        places = {name: self.word_of[f"tables.{name}"] for name in Tables.slots}
-        return {name: self._pointed[place] for name, place in places.items() if place in self._pointed}
+        indices = {name: self.word_of[f"tables.{name}"] for name in Tables.slots}
+        return {name: self._pointed[index] for name, index in indices.items() if index in self._pointed}
 
     def set_factors(self, h: float) -> None:
         """Set h and what is h times the velocities."""
@@ -241,10 +241,10 @@ class Context(Memory):
         if self.shape.second:
             rows, factors = self.shape.rows, self.factors
             kh = h * factors.velocity[:rows]
-            places = self.shape.places[rows:]
+            indices = self.shape.state_indices[rows:]
             factors.row[:rows] = kh
-            factors.drift[places] = kh
-            factors.kick[places + 4] = kh
+            factors.drift[indices] = kh
+            factors.kick[indices + 4] = kh
 
 
 def _qualified(tables: Mapping[str, Numbers]) -> dict[str, Numbers]:

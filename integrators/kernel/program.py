@@ -638,7 +638,7 @@ class AdaptiveProgram(HBVMProgram):
         if self._energy:
             context.energy.code = self._energy.address
             context.energy.width = width_of_blocks(self.system)
-            context.point({"energy.places": self.shape.places})
+            context.point({"energy.state_indices": self.shape.state_indices})
             context.solver.tolerance = max(PART_OF_TOLERANCE * self.tol, TOLERANCE)
             context.solver.log_rest = max(math.log2(context.solver.tolerance), LOG_REST_VARYING)
         context.solver.trusted = min(TRUSTED * context.solver.tolerance, MOST_TRUSTED)

@@ -463,7 +463,7 @@ class HBVMStepper(ABC):
             self._context.solved, self._context.length = 0, 0.0
 
     @property
-    def _places(self) -> list[int]:
+    def _indices(self) -> list[int]:
         """Words of a checkpoint."""
         return [self._context.word_of[name] for name in self._words]
 
@@ -477,7 +477,7 @@ class HBVMStepper(ABC):
         """Return a copy of all that the continuation depends on."""
         return Checkpoint(
             self._identity,
-            self._context.words[self._places],
+            self._context.words[self._indices],
             tuple(array.copy() for array in attrgetter(*self._kept)(self._context)),
             None if self._implicit is None else self._implicit[0].save(),
             self._taken,
@@ -505,7 +505,7 @@ class HBVMStepper(ABC):
                 "this checkpoint has no tangent vectors, or others; restore it before any follow."
             )
         arrays = attrgetter(*self._kept)(self._context)
-        sizes = len(self._places), [array.shape for array in arrays]
+        sizes = len(self._indices), [array.shape for array in arrays]
         if (checkpoint.words.size, [array.shape for array in checkpoint.arrays]) != sizes:
             raise InputError(
                 "this checkpoint is of another version of hbvm-bench, whose steps depend on other numbers; "
@@ -513,7 +513,7 @@ class HBVMStepper(ABC):
             )
         if checkpoint.par is not None:
             self._renew(checkpoint.par)
-        self._context.words[self._places] = checkpoint.words
+        self._context.words[self._indices] = checkpoint.words
         self._set_step(self._context.h)
         for array, kept in zip(arrays, checkpoint.arrays, strict=True):
             array[:] = kept

@@ -18,7 +18,7 @@ def _pull() -> Any:
     return pull
 
 
-record = Engine(_record, "what ctx tape", *SOURCES, "adjoint")
-"""``record(what, ctx, tape)``: see `integrators.kernel.adjoint.entry`; the steps call its address."""
+record = Engine(_record, "event ctx tape", *SOURCES, "adjoint")
+"""``record(event, ctx, tape)``: see `integrators.kernel.adjoint.entry`; the steps call its address."""
 pull = Engine(_pull, "ctx pullback", *SOURCES, "adjoint")
 """``pull(ctx, pullback)``: see `integrators.kernel.adjoint.entry`."""

@@ -38,11 +38,11 @@ def copy_stages(source, source_block, target, target_block, count, calls):
 
 
 @compiled
-def record(event, address, place):
+def record(event, address, memory_address):
     """Keep a solved step, or partial step; `integrators.kernel.context.Context.follow`."""
     if event not in (STEP, PART_END):
         return DONE
-    ctx, tape = context(address), tape_at(place)
+    ctx, tape = context(address), tape_at(memory_address)
     if tape.count == tape.capacity:
         tape.full = 1
         return DONE
@@ -78,9 +78,9 @@ def add_slopes(ctx, memory, h):
 
 
 @compiled
-def pull(address, place):
+def pull(address, memory_address):
     """Follow recorded steps backwards; return DONE, or how the equations of step `Pullback.next` ended."""
-    ctx, memory = context(address), pullback(place)
+    ctx, memory = context(address), pullback(memory_address)
     size = memory.states * ctx.lanes
     while memory.next < memory.count:
         head = memory.heads + HEAD * memory.next

@@ -104,7 +104,7 @@ class Group(Memory):
     times = Array()
     targets = Array(kind=int)  # steps before each sample,
     parts = Array()  # and the part of a step that is left
-    part_places = Array(kind=int)  # where among all lengths of parts that is; for each length
+    part_indices = Array(kind=int)  # where among all lengths of parts that is; for each length
     part_matrix = Array()  # (k, k): `matrix`,
     part_extrapolation = Array()  # (k, k): `extrapolation`,
     part_norms = Array()  # and `matrix_norm`

@@ -11,7 +11,7 @@ context_at = view(Context)
 
 
 @compiled
-def place(ctx, d):
+def state_index(ctx, d):
     """Return where component d of (q, p), or of y, is in a state of a `Context`."""
     if ctx.second == 0:
         return d
@@ -41,8 +41,8 @@ def fetch(group, lane, ctx):
     """Let the context of a lane have the solved step: its end, and the values of the field."""
     lanes, rows = group.lanes, group.rows
     for d in range(group.dim):
-        ctx.next_state[place(ctx, d)] = group.next_state[lanes * d + lane]
-        ctx.next_error[place(ctx, d)] = group.next_error[lanes * d + lane]
+        ctx.next_state[state_index(ctx, d)] = group.next_state[lanes * d + lane]
+        ctx.next_error[state_index(ctx, d)] = group.next_error[lanes * d + lane]
     for d in range(rows):
         for i in range(group.k):
             ctx.values[ctx.lanes * d + i] = group.values[lanes * (rows * i + d) + lane]

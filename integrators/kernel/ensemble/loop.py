@@ -75,10 +75,10 @@ def part_step(group, side, sample):
         side.alive[lane], side.iterations[lane] = group.alive[lane], 0.0
         side.rate[lane] = group.rate[lane]  # not that of another partial step
     side.n = 0
-    length = group.part_places[sample]
-    place = group.k * group.k * length
-    side.matrix = group.part_matrix + place
-    side.extrapolation = group.part_extrapolation + place
+    length = group.part_indices[sample]
+    start = group.k * group.k * length
+    side.matrix = group.part_matrix + start
+    side.extrapolation = group.part_extrapolation + start
     side.matrix_norm = group.part_norms[length]
     call_steps(side.code, side, 1)
     group.living = side.living

@@ -12,7 +12,7 @@ from math import log
 
 from integrators.kernel.context import DIVERGED, DONE
 from integrators.kernel.ensemble.group import LEFT, Group
-from integrators.kernel.ensemble.lane import clear, context_at, fetch, place, unload, write
+from integrators.kernel.ensemble.lane import clear, context_at, fetch, state_index, unload, write
 from integrators.kernel.ensemble.watch import has_room, keep_start, look_at_start, watch, watch_ordinary
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
@@ -67,7 +67,7 @@ def load(group, lane):
     begin_attempts(ctx)
     reset(ctx, group.starts + group.dim * i)
     for d in range(group.dim):
-        group.state[lanes * d + lane] = ctx.state[place(ctx, d)]
+        group.state[lanes * d + lane] = ctx.state[state_index(ctx, d)]
         group.error[lanes * d + lane] = 0.0
     if group.times[group.count - 1] < group.start_time:
         ctx.controller.next_length = -ctx.controller.next_length
@@ -140,7 +140,7 @@ def catch_up(group, lane, ctx):
     ctx.counters.steps += int(group.since[lane])
     ctx.implicit.slow = 0
     for d in range(group.dim):
-        ctx.state[place(ctx, d)] = group.state[group.lanes * d + lane]
+        ctx.state[state_index(ctx, d)] = group.state[group.lanes * d + lane]
     for d in range(group.rows):
         put(discontinuities.previous_boundary_values, 8 * d, splat8(0.0))
         discontinuities.previous_boundary_values[8 * d] = group.ends[group.lanes * d + lane]

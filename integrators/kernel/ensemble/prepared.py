@@ -107,14 +107,14 @@ class Lanes:
         from integrators.coefficients.legendre import legendre
 
         a, modes = self._constants.arrays, min(self.k, tables.MODES)
-        lengths, places = np.unique(parts, return_inverse=True)
+        lengths, indices = np.unique(parts, return_inverse=True)
         nodes = 1.0 + (lengths / h)[:, None] * a["nodes"].reshape(-1)
         basis = legendre(nodes.reshape(-1), modes).reshape(lengths.size, self.k, modes)
         factor = lengths * lengths if self.second and self.unit else lengths
         matrix = factor[:, None, None] * self._matrix(1.0)
         return {
             "parts": parts,
-            "part_places": places.astype(np.int64),
+            "part_indices": indices.astype(np.int64),
             "part_matrix": np.ascontiguousarray(matrix),
             "part_extrapolation": np.ascontiguousarray(basis @ a["to_legendre"][:modes]),
             "part_norms": _norm(matrix),

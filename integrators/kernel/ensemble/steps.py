@@ -319,7 +319,7 @@ class Steps(Writer):
     ) -> Callable[..., list[Value]]:
         """Return what makes ``sum_j table[i, j] values[j, d]`` for rows d, each added to a start.
 
-        Values that are ``known`` by their place are not loaded.
+        Values that are ``known`` by their index are not loaded.
         """
         k, rows = self.form.k, self.form.rows
         factors = [self.number(table, self.at(i, k, j)) for j in range(k)]
@@ -329,9 +329,9 @@ class Steps(Writer):
 
         def totals(some: list[Index], starts: list[Value] | None = None) -> list[Value]:
             for j in order:
-                places = [self.at(j, rows, d) for d in some]
+                indices = [self.at(j, rows, d) for d in some]
                 factor = factors[j]
-                operands = [known[p] if known and p in known else self.get(values, p) for p in places]
+                operands = [known[p] if known and p in known else self.get(values, p) for p in indices]
                 if starts is None:
                     starts = [factor * value for value in operands]
                 else:
@@ -439,13 +439,13 @@ class Steps(Writer):
             )
 
             def keep(d: Index) -> None:
-                place = self.at(i, rows, d)
-                old, new = self.get(values, place), self.get(self.field_values, d)
+                index = self.at(i, rows, d)
+                old, new = self.get(values, index), self.get(self.field_values, d)
                 self.put(self.get(self.moved, d).larger((new - old).absolute()), self.moved, d)
                 kept = new.where(active, old)
-                self.put(kept, values, place)
+                self.put(kept, values, index)
                 if self.unrolled:
-                    newest[place] = kept
+                    newest[index] = kept
 
             self.each_row(keep)
 

@@ -10,7 +10,7 @@ itself.
 
 from integrators.kernel.context import ACCUMULATE, ACTS, BY_VALUES, DONE, HALTED, RENEW
 from integrators.kernel.ensemble.group import ACCUMULATES, BY_EVENT, LEFT
-from integrators.kernel.ensemble.lane import clear, context_at, fetch, place, unload, write, write_until
+from integrators.kernel.ensemble.lane import clear, context_at, fetch, state_index, unload, write, write_until
 from integrators.kernel.events.actions import earlier
 from integrators.kernel.events.memory import START, TERMINAL, WHOLE, Search
 from integrators.kernel.events.value import call_entry
@@ -142,8 +142,8 @@ def show(group, lane, ctx):
     """Let the context of a lane have the solved step as that of a single trajectory has it."""
     set_factors(ctx, ctx.h)
     for d in range(group.dim):
-        ctx.state[place(ctx, d)] = group.start_state[group.lanes * d + lane]
-        ctx.error[place(ctx, d)] = group.start_error[group.lanes * d + lane]
+        ctx.state[state_index(ctx, d)] = group.start_state[group.lanes * d + lane]
+        ctx.error[state_index(ctx, d)] = group.start_error[group.lanes * d + lane]
     ctx.solver.rate = group.rate[lane]
     ctx.solved, ctx.n, ctx.blocks.age = BY_VALUES, 0, 0
 
@@ -248,7 +248,7 @@ def renew(group, lane, ctx, search):
 def begin_again(group, lane, ctx):
     """Let the trajectory of a lane begin at the state of its context."""
     for d in range(group.dim):
-        group.state[group.lanes * d + lane] = ctx.state[place(ctx, d)]
+        group.state[group.lanes * d + lane] = ctx.state[state_index(ctx, d)]
         group.error[group.lanes * d + lane] = 0.0
     clear(group, lane)
     group.rate[lane] = FIRST_RATE

@@ -40,8 +40,8 @@ class Writer:
 
     def word(self, slot: Slot, kind: Any = INTEGER) -> Any:
         """Return where a slot is."""
-        place = self.b.gep(self.words, [ir.Constant(INTEGER, slot.place)])
-        return self.b.bitcast(place, kind.as_pointer())
+        pointer = self.b.gep(self.words, [ir.Constant(INTEGER, slot.index)])
+        return self.b.bitcast(pointer, kind.as_pointer())
 
     def array(self, slot: Slot) -> Any:
         """Return the address in a slot."""
@@ -71,22 +71,22 @@ class Writer:
         """Load a variable that is a row."""
         return Value(self.b, self.b.load(variable))
 
-    def place(self, base: Any, index: Index, kind: Any) -> Any:
+    def pointer_to(self, base: Any, index: Index, kind: Any) -> Any:
         """Return the address of item ``index`` of an array of ``kind``."""
         index = ir.Constant(INTEGER, index) if isinstance(index, int) else index
         return self.b.gep(self.b.bitcast(base, kind.as_pointer()), [index])
 
     def get(self, base: Any, index: Index = 0) -> Value:
         """Load a row."""
-        return Value(self.b, self.b.load(self.place(base, index, self.kind), align=ALIGNMENT))
+        return Value(self.b, self.b.load(self.pointer_to(base, index, self.kind), align=ALIGNMENT))
 
     def put(self, value: Value, base: Any, index: Index = 0) -> None:
         """Store a row."""
-        self.b.store(value.value, self.place(base, index, self.kind), align=ALIGNMENT)
+        self.b.store(value.value, self.pointer_to(base, index, self.kind), align=ALIGNMENT)
 
     def number(self, base: Any, index: Index) -> Value:
         """Return a double of memory in all lanes."""
-        return Value(self.b, splat(self.b, self.b.load(self.place(base, index, DOUBLE)), self.lanes))
+        return Value(self.b, splat(self.b, self.b.load(self.pointer_to(base, index, DOUBLE)), self.lanes))
 
     def at(self, i: Index, width: int, d: Index = 0) -> Index:
         """Return ``i * width + d``."""

@@ -42,7 +42,7 @@ def ends_step(search, before, i):
 
 @compiled
 def keep(search, outof, into):
-    """Keep an occurrence in another place."""
+    """Keep an occurrence under another index."""
     search.hit_times[into] = search.hit_times[outof]
     search.hit_events[into] = search.hit_events[outof]
     search.hit_directions[into] = search.hit_directions[outof]

@@ -54,9 +54,9 @@ def keeps_away(search, degree):
 
 @compiled
 def refine(search, degree):
-    """Set values at finer places: samples where there is one, else the polynomial (Clenshaw's scheme)."""
+    """Set values at finer points: samples where there is one, else the polynomial (Clenshaw's scheme)."""
     stride, angles = FINEST // degree, search.cosines
-    x, p, coefficients = search.places, search.fine, search.coefficients
+    x, p, coefficients = search.points, search.fine, search.coefficients
     for i in range(FINE * degree):
         x[i] = angles[i * stride]
     none = splat8(0.0)
@@ -91,7 +91,7 @@ def keep_samples(search, degree):
     n = 0
     for i in range(degree + 1):
         if is_finite(search.values[i]):
-            search.places[n] = node(search, i, degree)
+            search.points[n] = node(search, i, degree)
             search.fine[n] = search.values[i]
             n += 1
     search.n = n

@@ -48,7 +48,7 @@ from integrators.kernel.step.sums import time_of_step
 DEEPEST = 8  # times that a step is halved where samples do not resolve a function
 ISOLATED = 16  # changes of sign in a part that is not resolved: a pole, a jump or a corner makes fewer
 LOST = 4.0  # times the rounding of one state: what many steps leave of a g that vanishes all along
-SHORTEST = 1e-6  # of a step is more than a unit in the last place of time: else there is no place inside
+SHORTEST = 1e-6  # of a step is more than a unit in the last place of time: else there is no point inside
 SAME = 1e-5  # of a step: a touch as close to another zero is none of its own
 ULP = 2.0**-52
 
@@ -279,16 +279,16 @@ def vanishes(ctx, search):
         return False
     top = -1
     for i in range(search.n):
-        inside = search.places[i] > 0.0 and search.places[i] < 1.0
+        inside = search.points[i] > 0.0 and search.points[i] < 1.0
         if inside and (top < 0 or abs(search.fine[i]) > abs(search.fine[top])):
             top = i
-    largest = search.places[top] if top >= 0 else 0.5
+    largest = search.points[top] if top >= 0 else 0.5
     return is_nothing(ctx, search, largest) and is_nothing(ctx, search, 0.5)
 
 
 @compiled
 def is_nothing(ctx, search, x):
-    """Whether the value at a place may be rounding's."""
+    """Whether the value at a point may be rounding's."""
     return abs(value_at(ctx, search, x)) <= LOST * noise_at(ctx, search, x)
 
 

@@ -2,10 +2,10 @@
 
 from integrators.kernel.native.memory import Array, Integer, Memory, Real
 
-FINE = 8  # places between two samples of a function where its zeros are looked for
+FINE = 8  # points between two samples of a function where its zeros are looked for
 FINEST = 256  # samples in a step, or in a part of one, that are not exceeded
-PLACES = FINE * FINEST + 1
-ROOM = 3 * PLACES  # for marks and zeros, of which a place has three at most
+POINTS = FINE * FINEST + 1
+ROOM = 3 * POINTS  # for marks and zeros, of which a point has three at most
 TINY = 2.0**-1000  # a sign without a size
 NOTED = 2  # `Search.due` of an event that has happened at this time, and does not again
 CACHED = 32  # states of a step that are remembered
@@ -19,7 +19,7 @@ GOING, TERMINAL, FULL, UNRESOLVED, RAISED, UNSOLVABLE, UNDEFINED = range(7)
 class Search(Memory):
     """The events of a trajectory: their functions, what of them is known, and work space for one step.
 
-    A *place* is a part of the stretch of time that is looked at, 0 at its start and 1 at its end.
+    A *point* is a part of the stretch of time that is looked at, 0 at its start and 1 at its end.
     """
 
     # --- what is looked for ---
@@ -105,13 +105,13 @@ class Search(Memory):
     values = Array(FINEST + 8)  # samples
     coefficients = Array(FINEST + 32)  # of Chebyshev polynomials
     missing = Real()  # what the coefficients that follow add up to at a corner, where the j-th is like 1/j^2
-    n = Integer()  # places where something is known
-    places = Array(PLACES)
-    fine = Array(PLACES)  # values of the polynomial there, or samples
+    n = Integer()  # points where something is known
+    points = Array(POINTS)
+    fine = Array(POINTS)  # values of the polynomial there, or samples
     scale = Real()  # the largest of them
-    lows = Array(PLACES, kind=int)
+    lows = Array(POINTS, kind=int)
     low_count = Integer()
-    marks = Array(ROOM)  # places where the sign of the function is known
+    marks = Array(ROOM)  # points where the sign of the function is known
     mark_signs = Array(ROOM, kind=int)
     mark_count = Integer()
     zeros = Array(ROOM)

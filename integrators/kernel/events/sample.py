@@ -24,13 +24,13 @@ def sign(x):
 
 @compiled
 def node(search, i, degree):
-    """Return the place of sample i."""
+    """Return the point of sample i."""
     return (1.0 - search.cosines[i * (FINE * FINEST // degree)]) / 2.0
 
 
 @compiled
 def time_at(search, x):
-    """Return the time of a place, which may be a little beyond the end."""
+    """Return the time of a point, which may be a little beyond the end."""
     if x == 0.0:
         return search.start
     return search.end if x == 1.0 else search.start + x * (search.end - search.start)
@@ -44,7 +44,7 @@ def part_at(search, t):
 
 @compiled
 def put_nodes(search, chunk, degree):
-    """Put the places of samples 1 + 8 chunk and of those that follow to where times are."""
+    """Put the points of samples 1 + 8 chunk and of those that follow to where times are."""
     stride = FINE * FINEST // degree
     for i in range(8):
         search.times[i] = 0.5 * (1.0 - search.cosines[(1 + 8 * chunk + i) * stride])

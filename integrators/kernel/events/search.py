@@ -81,7 +81,7 @@ def search_memory(
     }  # fmt: skip
     cosines, _, transforms = _tables()
     memory = Search(numbers, {"cosines": cosines, "transforms": transforms})
-    memory.asked = memory.address + 8 * Search.part.place
+    memory.asked = memory.address + 8 * Search.part.index
     memory.functions[:] = [function.address for function in functions]
     memory.directions[:] = [event.direction for event in events.values()]
     memory.limits[:] = [event.last for event in events.values()]

@@ -1,4 +1,4 @@
-"""Where a function changes its sign between two places, and where it is largest."""
+"""Where a function changes its sign between two points, and where it is largest."""
 
 from integrators.kernel.events.memory import TINY
 from integrators.kernel.events.sample import is_finite, sign
@@ -9,11 +9,11 @@ BESIDE = 1e-6  # of the stretch: extrema as close to its end are looked for from
 APART = 1e4  # units that times can be told apart by: a pole is looked at from a distance of as many
 POLE, ROOM = 1e3, 10.0  # where g is as many times larger than beside it, its sign changes through infinity
 MOST = 200  # evaluations for a zero
-# Of the stretch: two places as close tell the slope at the zero between or beside them
+# Of the stretch: two points as close tell the slope at the zero between or beside them
 SECANT_DISTANCE = 1e-3
 EXTREMUM = 1e-10  # of the stretch: where an extremum is, if the values near it can be told apart
 EDGE, MOVES = 1e-3, 8  # part of a bracket that is its edge; how often it is moved
-NEARER = 0.125  # a place as many times closer to the start is tried next
+NEARER = 0.125  # a point as many times closer to the start is tried next
 GOLDEN = 0.3819660112501051  # (3 - sqrt 5) / 2
 MOST_LOOKS = 500  # evaluations for an extremum
 NAN = float("nan")
@@ -22,10 +22,10 @@ INFINITY = float("inf")
 
 @compiled
 def guess(search, a, b):
-    """Return where the values that are known change their sign between two places, and how steep they are."""
-    places, fine = search.places, search.fine
+    """Return where the values that are known change their sign between two points, and how steep they are."""
+    points, fine = search.points, search.fine
     for i in range(search.n - 1):
-        x, y = places[i], places[i + 1]
+        x, y = points[i], points[i + 1]
         if y > a and x < b and sign(fine[i]) != sign(fine[i + 1]):
             slope = (fine[i + 1] - fine[i]) / (y - x)
             return min(max(x - fine[i] / slope, a), b), slope
@@ -34,14 +34,14 @@ def guess(search, a, b):
 
 @compiled
 def continued(ctx, search, x, otherwise):
-    """Return the value at a place, or in a hole between two known signs that of one of them."""
+    """Return the value at a point, or in a hole between two known signs that of one of them."""
     value = value_at(ctx, search, x)
     return value if is_finite(value) else otherwise
 
 
 @compiled
 def leave_start(ctx, search, a, b):
-    """Return a place beyond ``a`` with the sign that the function has there, before it changes towards ``b``.
+    """Return a point beyond ``a`` with the sign that the function has there, before it changes towards ``b``.
 
     After an event that changes the state the function is 0 at the start of a step and only its sign is known;
     a step of fixed size may be much longer than the time to the next zero. ``a`` itself if there is none.
@@ -56,7 +56,7 @@ def leave_start(ctx, search, a, b):
 
 @compiled
 def zero_between(ctx, search, a, b):
-    """Return the place of a change of sign between two places, to the last bit of time.
+    """Return the point of a change of sign between two points, to the last bit of time.
 
     The polynomial tells where to begin. Then secants, and halves where these do not close in.
     """
@@ -94,11 +94,11 @@ def zero_between(ctx, search, a, b):
 
 @compiled
 def largest_beside(ctx, search, x, distance):
-    """Return the largest size of a value at a distance from a place; -1 where there is none."""
+    """Return the largest size of a value at a distance from a point; -1 where there is none."""
     most = -1.0
-    for place in (x - distance, x + distance):
-        if place >= 0.0 and place <= 1.0:
-            value = abs(value_at(ctx, search, place))
+    for point in (x - distance, x + distance):
+        if point >= 0.0 and point <= 1.0:
+            value = abs(value_at(ctx, search, point))
             if is_finite(value):
                 most = max(most, value)
     return most
@@ -106,7 +106,7 @@ def largest_beside(ctx, search, x, distance):
 
 @compiled
 def is_pole(ctx, search, x, a, b):
-    """Whether the sign changes at a place through infinity; ``a`` and ``b`` are on both sides of it."""
+    """Whether the sign changes at a point through infinity; ``a`` and ``b`` are on both sides of it."""
     value = abs(value_at(ctx, search, x))
     if value <= max(abs(value_at(ctx, search, a)), abs(value_at(ctx, search, b))):
         return False  # times are so dense that it would be larger
@@ -177,7 +177,7 @@ def deepest(ctx, search, a, b, way):
 
 @compiled
 def extremum(ctx, search, a, b, way):
-    """Return the place that `deepest` finds between two.
+    """Return the point that `deepest` finds between two.
 
     Where it is at one of the two, the polynomial has misplaced them, and they are moved.
     """

@@ -1,4 +1,4 @@
-"""A function at any place of a step: exact, at the end of a partial step of the method itself."""
+"""A function at any point of a step: exact, at the end of a partial step of the method itself."""
 
 from llvmlite import ir
 from numba import types
@@ -72,7 +72,7 @@ def state_at(ctx, search, t):
 
 @compiled
 def value_at(ctx, search, x):
-    """Return the value of the function at a place, which may be a little beyond the end; NaN: none."""
+    """Return the value of the function at a point, which may be a little beyond the end; NaN: none."""
     if x == 0.0:
         return search.start_value
     if x == 1.0:
@@ -83,6 +83,6 @@ def value_at(ctx, search, x):
 
 @compiled
 def noise_at(ctx, search, x):
-    """Return how much of the value at a place rounding of the state may account for."""
+    """Return how much of the value at a point rounding of the state may account for."""
     t = time_at(search, x)
     return noise_of(ctx, search, t, state_at(ctx, search, t))

@@ -24,19 +24,19 @@ CORNER = 2.5  # times as much at twice the distance: where g is smooth it is 4, 
 
 
 @compiled
-def insert(places, directions, count, x, direction):
-    """Insert a place and its direction into ``count`` others that are in order; return how many they are."""
+def insert(points, directions, count, x, direction):
+    """Insert a point and its direction into ``count`` others that are in order; return how many they are."""
     i = count
-    while i > 0 and places[i - 1] > x:
-        places[i], directions[i] = places[i - 1], directions[i - 1]
+    while i > 0 and points[i - 1] > x:
+        points[i], directions[i] = points[i - 1], directions[i - 1]
         i -= 1
-    places[i], directions[i] = x, direction
+    points[i], directions[i] = x, direction
     return count + 1
 
 
 @compiled
 def mark(search, x, direction):
-    """Note the sign of the function at a place, in order."""
+    """Note the sign of the function at a point, in order."""
     search.mark_count = insert(search.marks, search.mark_signs, search.mark_count, x, direction)
 
 
@@ -48,8 +48,8 @@ def add_zero(search, x, direction):
 
 @compiled
 def turns_between(search, i, a, b):
-    """Whether the parabola through place i and its neighbours turns back from zero between two places."""
-    x, p = search.places + (i - 1), search.fine + (i - 1)
+    """Whether the parabola through point i and its neighbours turns back from zero between two points."""
+    x, p = search.points + (i - 1), search.fine + (i - 1)
     left, right = (p[1] - p[0]) / (x[1] - x[0]), (p[2] - p[1]) / (x[2] - x[1])
     curvature = (right - left) / (x[2] - x[0])
     if curvature * p[1] <= 0.0:
@@ -60,14 +60,14 @@ def turns_between(search, i, a, b):
 
 @compiled
 def add_low(search, i):
-    """Note a place where the polynomial turns back from near zero."""
+    """Note a point where the polynomial turns back from near zero."""
     search.lows[search.low_count] = i
     search.low_count += 1
 
 
 @compiled
 def find_lows(search, first, last):
-    """Note the places inside a run of one sign where the polynomial turns back from near zero.
+    """Note the points inside a run of one sign where the polynomial turns back from near zero.
 
     Near the ends of the stretch its parabola may miss a corner, but not that coefficients are missing.
     """
@@ -75,14 +75,14 @@ def find_lows(search, first, last):
     search.low_count = 0
     if last - first < 2:
         return
-    turns = abs(p[0]) < corner or turns_between(search, 1, -BESIDE, search.places[1])
+    turns = abs(p[0]) < corner or turns_between(search, 1, -BESIDE, search.points[1])
     if first == 0 and TINY < abs(p[0]) < least and turns:  # a sign without a size has been looked at
         add_low(search, 0)
     for i in range(first + 1, last):
         size = abs(p[i])
         if size <= abs(p[i - 1]) and size < abs(p[i + 1]) and size < least:
             add_low(search, i)
-    before = search.places[end - 1]
+    before = search.points[end - 1]
     turns = abs(p[end]) < corner or turns_between(search, end - 1, before, 1.0 + BESIDE)
     if last == end and abs(p[end]) < least and turns:
         add_low(search, end)
@@ -90,11 +90,11 @@ def find_lows(search, first, last):
 
 @compiled
 def change_beside(ctx, search, x, distance):
-    """Return by how much values differ at a distance from a place."""
+    """Return by how much values differ at a distance from a point."""
     here, change = value_at(ctx, search, x), 0.0
-    for place in (x - distance, x + distance):
-        if place >= 0.0 and place <= 1.0:
-            value = value_at(ctx, search, place)
+    for point in (x - distance, x + distance):
+        if point >= 0.0 and point <= 1.0:
+            value = value_at(ctx, search, point)
             if is_finite(value):
                 change = max(change, abs(value - here))
     return change
@@ -115,8 +115,8 @@ def blur(ctx, search, x):
 
 @compiled
 def extremum_around(ctx, search, i, j, way):
-    """Return the place of an extremum between the neighbours of two places."""
-    return extremum(ctx, search, search.places[max(i - 1, 0)], search.places[min(j + 1, search.n - 1)], way)
+    """Return the point of an extremum between the neighbours of two points."""
+    return extremum(ctx, search, search.points[max(i - 1, 0)], search.points[min(j + 1, search.n - 1)], way)
 
 
 BEYOND_END = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)  # of the stretch: how far beyond its end g may have a sign again
@@ -139,7 +139,7 @@ def direction_at_end(ctx, search, before):
 @compiled
 def mark_low(ctx, search, low, way):
     """Note what the function does where the polynomial, of sign ``way``, comes near zero and turns back."""
-    x, p = search.places[low], search.fine[low]
+    x, p = search.points[low], search.fine[low]
     value = value_at(ctx, search, x)
     # Between these it may fall by as much as it rises, at a corner, which the polynomial also rounds.
     margin = SURE * search.missing
@@ -171,8 +171,8 @@ def mark_run(ctx, search, first, last):
     """Note where the function has which sign in a run: at its largest values, and at extrema near zero."""
     way = sign(search.fine[first])
     find_lows(search, first, last)
-    starts = first == 0 and search.places[0] == 0.0
-    ends = last == search.n - 1 and search.places[last] == 1.0
+    starts = first == 0 and search.points[0] == 0.0
+    ends = last == search.n - 1 and search.points[last] == 1.0
     count = search.low_count
     if (starts or ends) and count == 0:  # the sign is that of the stretch's end
         return
@@ -182,7 +182,7 @@ def mark_run(ctx, search, first, last):
         top = a
         for j in range(a, b + 1):
             top = j if abs(search.fine[j]) > abs(search.fine[top]) else top
-        x = search.places[top]
+        x = search.points[top]
         if x > 0.0 and x < 1.0:
             value = value_at(ctx, search, x)
             if value == 0.0 or sign(value) == -way:  # the polynomial errs: g may still get there nearby
@@ -198,7 +198,7 @@ def mark_run(ctx, search, first, last):
 
 @compiled
 def solve(ctx, search, a, b, after):
-    """Note the zero between two places where the function has different signs; there is none at a pole."""
+    """Note the zero between two points where the function has different signs; there is none at a pole."""
     wanted = search.directions[search.event]
     if wanted != 0 and wanted != after:
         return
@@ -226,13 +226,13 @@ def find_zeros(ctx, search):
         before = sign(p[i - 1])
         if p[i] == 0.0 and before != 0 and before == sign(p[i + 1]):  # a sample right at a touch
             mark_low(ctx, search, i, before)
-    if search.places[0] == 0.0 and p[0] != 0.0:
+    if search.points[0] == 0.0 and p[0] != 0.0:
         mark(search, 0.0, sign(p[0]))
     count, marks, signs = search.mark_count, search.marks, search.mark_signs
     for i in range(count - 1):
         if signs[i] != signs[i + 1]:
             solve(ctx, search, marks[i], marks[i + 1], signs[i + 1])
-    if search.places[n - 1] == 1.0 and count > 0:
+    if search.points[n - 1] == 1.0 and count > 0:
         before = signs[count - 1]
         if p[n - 1] == 0.0:
             add_zero(search, 1.0, direction_at_end(ctx, search, before))

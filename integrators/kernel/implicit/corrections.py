@@ -143,8 +143,8 @@ def full(ctx, m, above):
                 total = 0.0
                 for j in range(s):
                     total += m.x[s * i + j] * x[j * rows + d]
-                place = at(m, i, above + d)
-                m.correction[place] = m.residual[place] + ctx.factors.row[above + d] * total
+                index = at(m, i, above + d)
+                m.correction[index] = m.residual[index] + ctx.factors.row[above + d] * total
     return True
 
 

@@ -12,5 +12,5 @@ def _entry() -> Any:
     return entry
 
 
-solver = Engine(_entry, "ctx place started", *SOURCES, "implicit")
+solver = Engine(_entry, "ctx memory started", *SOURCES, "implicit")
 """Its address is what `integrators.kernel.step.solver_switch` calls."""

@@ -10,6 +10,6 @@ context, workspace = view(Context), view(Workspace)
 
 
 @compiled
-def entry(ctx, place, started):
+def entry(ctx, memory, started):
     """Solve the step of the context at an address with the workspace at another; see `solve_step`."""
-    return solve_step(context(ctx), workspace(place), started)
+    return solve_step(context(ctx), workspace(memory), started)

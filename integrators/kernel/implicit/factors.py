@@ -122,10 +122,10 @@ class _Pattern:
     def __init__(self, rows: Any, columns: Any, n: int):
         diagonal = np.arange(n)
         flat = np.concatenate([columns * n + rows, diagonal * (n + 1)])
-        places, where = np.unique(flat, return_inverse=True)
+        positions, where = np.unique(flat, return_inverse=True)
         self._entries, self._diagonal = where[: rows.size], where[rows.size :]
-        self._indices = (places % n).astype(np.int32)
-        self._starts = np.searchsorted(places, np.arange(n + 1) * n).astype(np.int32)
+        self._indices = (positions % n).astype(np.int32)
+        self._starts = np.searchsorted(positions, np.arange(n + 1) * n).astype(np.int32)
         self._n = n
 
     def matrix(self, entries: Any) -> Any:

@@ -46,7 +46,7 @@ class Linearization:
         """Of the code; 0 for differences."""
         return 0 if self.code is None else self.code.address
 
-    def places(self, rows: int) -> tuple[Integers, Integers]:
+    def entry_indices(self, rows: int) -> tuple[Integers, Integers]:
         """Return the rows and the columns of the entries; by differences they are all of them."""
         if self.jacobian is not None:
             return self.jacobian.rows, self.jacobian.columns
@@ -217,7 +217,7 @@ class Workspace(Memory):
         c = shape.constants
         m = method(c.k, c.s, shape.second, c.lanes, solver_of(c.s, kind))
         unknowns = shape.rows // copies
-        rows, columns = linearization.places(unknowns)
+        rows, columns = linearization.entry_indices(unknowns)
         pairs, whole = m.eigenvalues.size, c.s * unknowns
         padded = -(-shape.rows // 8) * 8 if padded is None else padded
         parts, groups, pair_groups = 2 if shape.second else 1, -(-c.s // 8), -(-pairs // 8)
@@ -331,7 +331,7 @@ def _in_eights(rows: Any) -> Any:
 
 # What goes from step to step, but for the factors, which follow from the Jacobian's entries.
 _LASTING = [
-    slot.place
+    slot.index
     for slot in (
         Workspace.linearized, Workspace.stale, Workspace.predict, Workspace.since, Workspace.factored_h,
         Workspace.change, Workspace.rate, Workspace.contraction, Workspace.contraction_h,

@@ -12,5 +12,5 @@ def _entry() -> Any:
     return entry
 
 
-line = Engine(_entry, "what ctx", *SOURCES, "line")
+line = Engine(_entry, "operation ctx", *SOURCES, "line")
 """Its address is what the steps call where there is a `integrators.kernel.context.Context.line`."""

@@ -9,7 +9,7 @@ from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.lanes import fma, two_sum
 from integrators.kernel.simd.memory import call_field
 from integrators.kernel.step.finish import added
-from integrators.kernel.step.stages import place
+from integrators.kernel.step.stages import group_offset
 
 context = view(LineContext)
 
@@ -67,7 +67,7 @@ def end(ctx):
     for d in range(ctx.rows):
         mean, low = 0.0, 0.0
         for i in range(ctx.k):
-            value = values[place(i // 8, block, lanes) + lanes * d + i % 8]
+            value = values[group_offset(i // 8, block, lanes) + lanes * d + i % 8]
             term = weights[i] * value
             mean, lost = two_sum(mean, term)
             low += lost + fma(weights[i], value, -term) + weights_low[i] * value

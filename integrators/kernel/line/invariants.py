@@ -22,7 +22,7 @@ then vanish exactly, and a fixed-order factorization leaves them so.
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.memory import call_field, get, larger, largest, put, splat8, spread, total
 from integrators.kernel.step.fixed_point import multiply
-from integrators.kernel.step.stages import offset, place
+from integrators.kernel.step.stages import group_offset, offset
 
 DEPENDENT = 1e-10  # a pivot this small, relative to its row, is none
 REGULAR = 1e-6  # rounding is taken back along these directions only
@@ -33,7 +33,7 @@ GAIN = 0.125  # of a gap is taken back in a step: the noise of its evaluation av
 @compiled
 def row(ctx, chunk):
     """Return where in `LineContext.gradients` the first row of a group of eight stages is."""
-    return place(chunk, ctx.every * ctx.lanes, ctx.lanes)
+    return group_offset(chunk, ctx.every * ctx.lanes, ctx.lanes)
 
 
 @compiled

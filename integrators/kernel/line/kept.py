@@ -151,14 +151,14 @@ def order_of_sums(system: System) -> tuple[NDArray[np.int64], NDArray[np.int64]]
     odd sum over two bodies that mirror each other it is exactly 0. Without bodies,
     positions and momenta make one each.
     """
-    places = np.arange(system.dim)
+    indices = np.arange(system.dim)
     if system.bodies is not None and system.dof is not None:
         groups = list(
-            places.reshape(2, -1, system.bodies.dimension)
+            indices.reshape(2, -1, system.bodies.dimension)
             .transpose(0, 2, 1)
             .reshape(2 * system.bodies.dimension, -1)
         )
     else:
-        groups = np.array_split(places, 1 if system.dof is None else 2)
+        groups = np.array_split(indices, 1 if system.dof is None else 2)
     ends = [np.arange(group.size) == group.size - 1 for group in groups]
     return np.concatenate(groups).astype(np.int64), np.concatenate(ends).astype(np.int64)

@@ -3,7 +3,7 @@
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.memory import get, put, splat8
 from integrators.kernel.step.fixed_point import multiply
-from integrators.kernel.step.stages import offset, place
+from integrators.kernel.step.stages import group_offset, offset
 
 
 @compiled
@@ -13,7 +13,7 @@ def keep_energy(ctx):
     multiply(ctx.onto, ctx.coefficient_groups, ctx.chunks, ctx.gradients, lanes, ctx.legendre, 8, dim, every)
     multiply(ctx.back, ctx.chunks, ctx.coefficient_groups, ctx.legendre, 8, ctx.rest, lanes, dim, every)
     for chunk in range(ctx.chunks):
-        start = place(chunk, every * lanes, lanes)
+        start = group_offset(chunk, every * lanes, lanes)
         structure, slope = ctx.gradients + start, ctx.rest + start
         values = ctx.values + offset(ctx, chunk)
         for d in range(dim):

@@ -46,13 +46,13 @@ def _kind_of(memory: Any, name: str) -> Any:
 
 def _word(context: Any, builder: Any, memory: Any, slot: Any, kind: Any) -> Any:
     """Return where a slot is, as a pointer to what it holds."""
-    place = builder.gep(memory, [ir.Constant(INTEGER, slot.place)])
-    return builder.bitcast(place, context.get_value_type(kind).as_pointer())
+    pointer = builder.gep(memory, [ir.Constant(INTEGER, slot.index)])
+    return builder.bitcast(pointer, context.get_value_type(kind).as_pointer())
 
 
 def _read(context, builder, typ, value, attr):
     if attr in typ.declared.part_of:
-        return builder.gep(value, [ir.Constant(INTEGER, typ.declared.part_of[attr].place)])
+        return builder.gep(value, [ir.Constant(INTEGER, typ.declared.part_of[attr].index)])
     slot = typ.declared.slots[attr]
     kind = _kind(slot)
     held = builder.load(_word(context, builder, value, slot, kind))

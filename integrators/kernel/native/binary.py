@@ -70,8 +70,8 @@ def sources(*modules: str) -> str:
     """Return the digest of modules and folders, by paths from the kernel: an edit voids their code."""
     digest = hashlib.sha256()
     for name in modules:
-        place = Path(__file__).parents[1] / name
-        for file in sorted(place.glob("*.py")) if place.is_dir() else [place.with_suffix(".py")]:
+        path = Path(__file__).parents[1] / name
+        for file in sorted(path.glob("*.py")) if path.is_dir() else [path.with_suffix(".py")]:
             digest.update(file.read_bytes())
     return digest.hexdigest()
 

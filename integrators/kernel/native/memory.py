@@ -60,7 +60,7 @@ class Slot:
     """One word of eight bytes: a number, or the address of an array."""
 
     name: str
-    place: int
+    index: int
     """Which word it is of what declares it."""
 
     def __set_name__(self, owner: type, name: str) -> None:
@@ -98,7 +98,7 @@ class Integer(Number):
         def __set__(self, memory: "_Slots", value: int) -> None: ...
 
     def _write(self, memory: "_Slots", value: float) -> None:
-        memory.words[self.place] = value
+        memory.words[self.index] = value
 
 
 class Real(Number):
@@ -118,7 +118,7 @@ class Real(Number):
         def __set__(self, memory: "_Slots", value: float) -> None: ...
 
     def _write(self, memory: "_Slots", value: float) -> None:
-        memory.reals[self.place] = value
+        memory.reals[self.index] = value
 
 
 class Array(Slot):
@@ -145,10 +145,10 @@ class Array(Slot):
     def __get__(self, memory: "_Slots | None", owner: type) -> Any:
         if memory is None:
             return self
-        if (pointed := memory._pointed.get(memory._first + self.place)) is not None:
+        if (pointed := memory._pointed.get(memory._first + self.index)) is not None:
             return pointed
         # Compiled code may have exchanged it for another.
-        start = memory._first + (int(memory.words[self.place]) - memory.address) // 8
+        start = memory._first + (int(memory.words[self.index]) - memory.address) // 8
         words = memory._memory[start : memory._ends[start]]
         return words if self.of is float else words.view(np.int64)
 
@@ -164,7 +164,7 @@ class Within(Generic[Declared]):
     """Where a memory has a part."""
 
     name: str
-    place: int
+    index: int
 
     def __init__(self, declared: type[Declared]):
         self.declared = declared
@@ -207,7 +207,7 @@ class _Slots:
             raise TypeError(f"{cls.__name__} declares again what its base has: {', '.join(twice)}.")
         slots, parts, fields = dict(cls.slots), dict(cls.part_of), []
         for name, slot in own.items():
-            slot.place = cls._size
+            slot.index = cls._size
             if isinstance(slot, Slot):
                 slots[name] = slot
                 cls._size += 1
@@ -226,11 +226,11 @@ class Part(_Slots):
     """Slots of one idea, which lie side by side in a `Memory`."""
 
     def __init__(self, memory: "Memory", within: "Within[Any]"):
-        self._first = within.place
-        end = within.place + self._size
-        self.words, self.reals = memory.words[within.place : end], memory.reals[within.place : end]
+        self._first = within.index
+        end = within.index + self._size
+        self.words, self.reals = memory.words[within.index : end], memory.reals[within.index : end]
         self.numbers = getattr(memory.numbers, within.name)
-        self.address = memory.address + 8 * within.place
+        self.address = memory.address + 8 * within.index
         self._memory, self._ends, self._pointed = memory._memory, memory._ends, memory._pointed
 
 
@@ -264,11 +264,11 @@ class Memory(_Slots):
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
-        cls._all, cls.word_of = dict(cls.slots), {name: slot.place for name, slot in cls.slots.items()}
+        cls._all, cls.word_of = dict(cls.slots), {name: slot.index for name, slot in cls.slots.items()}
         for part in cls.part_of.values():
             for name, slot in part.declared.slots.items():
                 cls._all[f"{part.name}.{name}"] = slot
-                cls.word_of[f"{part.name}.{name}"] = part.place + slot.place
+                cls.word_of[f"{part.name}.{name}"] = part.index + slot.index
 
     def __init__(self, numbers: Mapping[str, float], arrays: Mapping[str, NDArray[Any]]):
         def size(n: int | str, part: str) -> int:
@@ -290,7 +290,7 @@ class Memory(_Slots):
             self.words[self.word_of[name]] = self.address + 8 * start
         for name, value in numbers.items():
             (self.reals if isinstance(self._all[name], Real) else self.words)[self.word_of[name]] = value
-        self._find_places()
+        self._find_indices()
         self._pointed = {}
         self.point(arrays)
 
@@ -320,8 +320,8 @@ class Memory(_Slots):
     def become(self, other: Self) -> None:
         """Take the content of another of the same shape, and point to the same arrays."""
         self._memory[:] = other._memory
-        self._own, self._places = other._own, other._places
-        self.words[self._places] += self.address - other.address
+        self._own, self._indices = other._own, other._indices
+        self.words[self._indices] += self.address - other.address
         self._point_as(other._pointed)
 
     def content(self) -> "Content":
@@ -344,13 +344,13 @@ class Memory(_Slots):
         """Let slots point to arrays, and keep these alive."""
         self.repointed = True
         for name, array in arrays.items():
-            place = self.word_of[name]
-            self._pointed[place] = array
-            self.words[place] = address(array)
+            index = self.word_of[name]
+            self._pointed[index] = array
+            self.words[index] = address(array)
         if not self._own.keys().isdisjoint(arrays):
             self._own = {name: part for name, part in self._own.items() if name not in arrays}
-            self._find_places()
+            self._find_indices()
 
-    def _find_places(self) -> None:
+    def _find_indices(self) -> None:
         # of the addresses in this memory, which are others in a copy
-        self._places = np.array([self.word_of[name] for name in self._own], dtype=np.intp)
+        self._indices = np.array([self.word_of[name] for name in self._own], dtype=np.intp)

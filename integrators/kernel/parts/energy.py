@@ -13,6 +13,6 @@ class Energy(Part):
     scale = Real()  # and the inverse of how much of it the components make there
     rows = Integer()  # of what it writes: one more than the state has; 0: no projection
     width = Integer()  # components of a block of the state
-    places = Array(kind=int)  # where the components of (q, p) or y are in the state
+    state_indices = Array(kind=int)  # where the components of (q, p) or y are in the state
     state = Array("rows", 8)
     outputs = Array("rows", 8)

@@ -128,8 +128,8 @@ FOLDS = [
 """How eight vectors become four, two and one, by adding halves: their number, and which lanes of two."""
 
 
-def _halves(builder: Any, first: Any, second: Any, places: Any) -> list[Any]:
-    return [builder.shuffle_vector(first, second, half) for half in places]
+def _halves(builder: Any, first: Any, second: Any, halves: Any) -> list[Any]:
+    return [builder.shuffle_vector(first, second, half) for half in halves]
 
 
 @intrinsic
@@ -141,8 +141,8 @@ def sums(typing, v0, v1, v2, v3, v4, v5, v6, v7):
     """
 
     def generate(context, builder, sig, args):
-        for n, *places in FOLDS:
-            args = [builder.fadd(*_halves(builder, args[i], args[i + n], places)) for i in range(n)]
+        for n, *halves in FOLDS:
+            args = [builder.fadd(*_halves(builder, args[i], args[i + n], halves)) for i in range(n)]
         return args[0]
 
     return EIGHT(*[EIGHT] * 8), generate

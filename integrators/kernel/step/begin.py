@@ -166,9 +166,9 @@ def octaves(ratio):
 
 
 @compiled
-def ratio_at(place):
+def ratio_at(index):
     """Return one of the `tables.RATIOS`."""
-    part = place / PER_OCTAVE
+    part = index / PER_OCTAVE
     return part if part > 1.0 else 0.5 + 0.5 * part
 
 

@@ -146,10 +146,10 @@ def differs_at_an_end(ctx):
     for lane in range(1, lanes):
         times[lane] = t + ctx.h - inside if ends_at_break(ctx) else t + ctx.h
     for d in range(rows):
-        place = 8 * (d // 4) + 4 + d % 4 if second else d
-        stages[lanes * d] = ctx.state[place]
+        index = 8 * (d // 4) + 4 + d % 4 if second else d
+        stages[lanes * d] = ctx.state[index]
         for lane in range(1, lanes):
-            stages[lanes * d + lane] = ctx.next_state[place]
+            stages[lanes * d + lane] = ctx.next_state[index]
     call_field(ctx.field, times, stages, ctx.par, values)
     ctx.counters.evaluations += 2
     # Unseen for no longer than the part of the step before the first node.
@@ -282,9 +282,9 @@ def confirm_previous_step(ctx):
     for lane in range(lanes):
         times[lane] = ctx.t0
     for d in range(rows):
-        place = 8 * (d // 4) + 4 + d % 4 if second else d
+        index = 8 * (d // 4) + 4 + d % 4 if second else d
         for lane in range(lanes):
-            stages[lanes * d + lane] = ctx.state[place]
+            stages[lanes * d + lane] = ctx.state[index]
     call_field(ctx.field, times, stages, ctx.par, values)
     ctx.counters.evaluations += 1
     ctx.discontinuities.boundary = SEEN

@@ -21,7 +21,7 @@ from integrators.kernel.simd.memory import (
     spread,
 )
 from integrators.kernel.step.size import change
-from integrators.kernel.step.stages import offset, place
+from integrators.kernel.step.stages import group_offset, offset
 from integrators.kernel.tables import WIDE
 
 INFINITY = float("inf")
@@ -118,9 +118,9 @@ def product_for_one(ctx, table):
 def multiply(table, chunks, groups, source, source_lanes, target, target_lanes, rows, padded):
     """Target = table source, both in the layout of stage memory, in pieces of 8 x 8."""
     for chunk in range(chunks):
-        into = target + place(chunk, padded * target_lanes, target_lanes)
+        into = target + group_offset(chunk, padded * target_lanes, target_lanes)
         for group in range(groups):
-            outof = source + place(group, padded * source_lanes, source_lanes)
+            outof = source + group_offset(group, padded * source_lanes, source_lanes)
             matrix = columns(table, 64 * (chunk * groups + group), 8)
             if group == 0:
                 for d in range(rows):

@@ -93,14 +93,14 @@ def iterations(inner: str, lanes: int, rows: int, by_columns: bool) -> str:
     def array(slot: str) -> Any:
         return b.inttoptr(b.load(word(slot)), pointer)
 
-    def place(base: Any, index: int, kind: Any) -> Any:
+    def pointer_to(base: Any, index: int, kind: Any) -> Any:
         return b.bitcast(b.gep(base, [number(index)]), kind.as_pointer())
 
     def get(base: Any, index: int, kind: Any) -> Any:
-        return b.load(place(base, index, kind), align=None if kind == DOUBLE else ALIGNMENT)
+        return b.load(pointer_to(base, index, kind), align=None if kind == DOUBLE else ALIGNMENT)
 
     def put(value: Any, base: Any, index: int) -> None:
-        b.store(value, place(base, index, value.type), align=ALIGNMENT)
+        b.store(value, pointer_to(base, index, value.type), align=ALIGNMENT)
 
     def lane(value: Any, j: int) -> Any:
         """Return lane j in eight lanes."""

@@ -23,7 +23,7 @@ def grazes(ctx):
     for i in range(1, 1 + ctx.surfaces.count):
         before, here, x_before, x_here = distance(ctx, i, 0), distance(ctx, i, 1), 0.0, ctx.tables.nodes[0]
         for j in range(2, last + 1):
-            after, x_after = distance(ctx, i, j), place(ctx, j)
+            after, x_after = distance(ctx, i, j), part_at(ctx, j)
             near = may_vanish(before, here, after, x_here - x_before, x_after - x_here)
             if near and touches(ctx, i, x_before, x_after):
                 return True
@@ -32,14 +32,14 @@ def grazes(ctx):
 
 
 @compiled
-def place(ctx, j):
+def part_at(ctx, j):
     """Return the part of the step at which point j is: the start, the nodes, the end."""
     return 0.0 if j == 0 else ctx.tables.nodes[j - 1] if j <= ctx.k else 1.0
 
 
 @compiled
 def distance(ctx, i, j):
-    """Return the distance from surface i at point j of `place`."""
+    """Return the distance from surface i at point j of `part_at`."""
     lanes = ctx.lanes
     if j == 0 or j > ctx.k:
         return abs(ctx.surfaces.ends[lanes * i + (1 if j else 0)])

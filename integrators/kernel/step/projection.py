@@ -24,9 +24,9 @@ def evaluate_energy(ctx, state):
     """Set `Energy.outputs` to the gradient at a state, and then the energy; return that."""
     energy = ctx.energy
     rows = energy.rows - 1
-    places, given, outputs = energy.places, energy.state, energy.outputs
+    state_indices, given, outputs = energy.state_indices, energy.state, energy.outputs
     for i in range(rows):
-        put(given, 8 * i, splat8(state[places[i]]))
+        put(given, 8 * i, splat8(state[state_indices[i]]))
     call_field(energy.code, ctx.times, given, ctx.par, outputs)
     return outputs[8 * rows]
 
@@ -57,14 +57,14 @@ def project_onto_energy(ctx):
     """Move the next state to the energy `Energy.start`; leave it where its energy cannot be changed so."""
     energy = ctx.energy
     rows, width, scale = energy.rows - 1, energy.width, energy.scale
-    places, slope, state, error = energy.places, energy.outputs, ctx.next_state, ctx.next_error
+    state_indices, slope, state, error = energy.state_indices, energy.outputs, ctx.next_state, ctx.next_error
     for _ in range(MOST_CORRECTIONS):
         gap = evaluate_energy(ctx, state) - energy.start
         steepness = 0.0
         for first in range(0, rows, width):
             size = block_size(ctx, first)
             for i in range(first, first + width):
-                gap += slope[8 * i] * error[places[i]]
+                gap += slope[8 * i] * error[state_indices[i]]
                 weighted = size * (slope[8 * i] * scale)
                 steepness += weighted * weighted
                 slope[8 * i] = size * weighted
@@ -73,7 +73,7 @@ def project_onto_energy(ctx):
             return
         factor = -gap / steepness
         for i in range(rows):
-            j = places[i]
+            j = state_indices[i]
             new, lost = two_sum(state[j], factor * slope[8 * i] + error[j])
             state[j] = new
             error[j] = lost

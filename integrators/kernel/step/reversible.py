@@ -26,12 +26,12 @@ def find_slope(ctx):
     pace = ctx.pace
     state, lanes, rows, values = pace.state, ctx.lanes, ctx.rows, pace.values
     for d in range(pace.rows):
-        place = d
+        index = d
         if ctx.second:
             i = d % rows
-            place = 8 * (i // 4) + i % 4 + (4 if d < rows else 0)
+            index = 8 * (i // 4) + i % 4 + (4 if d < rows else 0)
         for lane in range(lanes):
-            state[lanes * d + lane] = ctx.state[place]
+            state[lanes * d + lane] = ctx.state[index]
     call_field(pace.code, pace.times, state, pace.par, values)
     pace.density_slope = values[lanes]
     return values[0] ** 0.25

@@ -66,10 +66,10 @@ def look_across(ctx, outcome):
     for lane in range(lanes):
         times[lane] = ctx.t0 + (ctx.h if lane else 0.0)
     for d in range(rows):
-        place = 8 * (d // 4) + 4 + d % 4 if second else d
+        index = 8 * (d // 4) + 4 + d % 4 if second else d
         ends[lanes * d] = ctx.scratch.row_state[d]
         for lane in range(1, lanes):
-            ends[lanes * d + lane] = ctx.next_state[place]
+            ends[lanes * d + lane] = ctx.next_state[index]
     call_field(surfaces.code, times, ends, ctx.par, surfaces.ends)
     surfaces.across = NO_SURFACE
     here = value_at(ctx, 0, first_point(ctx))

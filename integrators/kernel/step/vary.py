@@ -341,11 +341,11 @@ def accepts(ctx, outcome, iterations, implicit):
         return False
     good = is_good(error, controller.allowed_error, quadrature_error, controller.allowed_quadrature_error)
     if surfaces.code and (surfaces.locating or (surfaces.across != NO_SURFACE and not good)):
-        place = locate(ctx, outcome, good)
-        if place == AGAIN:
+        verdict = locate(ctx, outcome, good)
+        if verdict == AGAIN:
             again(ctx, outcome, implicit)
             return False
-        if place == REACHED:
+        if verdict == REACHED:
             end_on_surface(ctx, factor, iterations, implicit)
             return True
         surfaces.locating = 0

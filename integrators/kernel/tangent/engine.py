@@ -12,5 +12,5 @@ def _entry() -> Any:
     return entry
 
 
-follow = Engine(_entry, "what ctx place", *SOURCES, "tangent")
+follow = Engine(_entry, "operation ctx memory", *SOURCES, "tangent")
 """``follow(what, ctx, tangents)``: see `integrators.kernel.tangent.entry`; the steps call its address."""

@@ -161,12 +161,12 @@ def write_vectors(memory, g, first, vectors, state, written):
 
 
 @compiled
-def entry(operation, address, place):
+def entry(operation, address, memory_address):
     """Do what `Context.follow` promises; return the outcome.
 
     BUDGET: come again with the implicit solver.
     """
-    ctx, memory = context(address), tangents(place)
+    ctx, memory = context(address), tangents(memory_address)
     trajectory = context(memory.trajectory)
     first = 0
     for g in range(memory.groups):

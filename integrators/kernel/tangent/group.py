@@ -81,8 +81,8 @@ class Group:
         dim, rows = contexts[0].shape.dim, contexts[0].shape.rows
         numbers = np.arange(dim * count).reshape(dim, count)
         in_order = numbers.T.reshape(count, -1, rows).swapaxes(0, 1).reshape(-1)  # as `Context.read` has them
-        self._places = np.empty((dim, count), dtype=np.intp)  # of component i of vector v in a state
-        self._places.flat[in_order] = self.own.shape.places
+        self._indices = np.empty((dim, count), dtype=np.intp)  # of component i of vector v in a state
+        self._indices.flat[in_order] = self.own.shape.state_indices
 
     @property
     def nbytes(self) -> int:
@@ -105,16 +105,16 @@ class Group:
                     velocities[: velocity.size] = velocity
             self.pulls = self._pulls(chosen)
             self._contents, self._key = (self.own.content(), self.partial.content()), key
-        self._state[self._places] = chosen.state
+        self._state[self._indices] = chosen.state
 
     def read(self) -> Array:
         """Return the vectors at the last step, shape (dim, n)."""
-        return self.own.state[self._places]
+        return self.own.state[self._indices]
 
     def put(self, vectors: Array) -> None:
         """Set the vectors at the last step, shape (dim, n)."""
         own = self.own
-        own.state[self._places] = vectors
+        own.state[self._indices] = vectors
         own.error[:] = 0.0
         own.length = own.older_length = 0.0
         own.blocks.age = 0
@@ -122,8 +122,8 @@ class Group:
     def scale(self, factors: Array) -> None:
         """Multiply the vectors at the last step by n numbers."""
         own = self.own
-        own.error[self._places] *= factors
-        own.state[self._places] *= factors
+        own.error[self._indices] *= factors
+        own.state[self._indices] *= factors
         own.length = own.older_length = 0.0
 
     def _new_context(self) -> Context:
