@@ -221,8 +221,8 @@ class _InLanes:
 
     def advance(self, memory: Any, budget: int) -> int:
         """Go on; return 1 at the end, or 0 after so many steps."""
-        group, side = memory
-        return run(group.address, side.address, budget)
+        group, partial = memory
+        return run(group.address, partial.address, budget)
 
     def pace(self) -> Pace:
         """Return how many steps are taken between two looks at Ctrl-C."""

@@ -13,8 +13,8 @@ def _run() -> Any:
     return run
 
 
-run = Engine(_run, "group side budget", *SOURCES, "step/rule", "step/sums")
-"""``run(group, side, budget)``: see `integrators.kernel.ensemble.loop`."""
+run = Engine(_run, "group partial budget", *SOURCES, "step/rule", "step/sums")
+"""``run(group, partial, budget)``: see `integrators.kernel.ensemble.loop`."""
 
 
 def _run_own() -> Any:

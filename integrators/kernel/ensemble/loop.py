@@ -59,32 +59,32 @@ def copy(source, target, count):
 
 
 @compiled
-def part_step(group, side, sample):
-    """Solve in ``side`` the step of a sample's part from the state of ``group``, which stays as it is."""
+def part_step(group, partial, sample):
+    """Solve in ``partial`` the step of a sample's part from the state of ``group``, which stays as it is."""
     lanes, part = group.lanes, group.parts[sample]
-    copy(group.state, side.state, lanes * group.dim)
-    copy(group.error, side.error, lanes * group.dim)
-    copy(group.par, side.par, lanes * group.parameters)
-    copy(group.velocity, side.velocity, lanes * group.rows)
-    copy(group.values, side.values, lanes * group.rows * group.k)
+    copy(group.state, partial.state, lanes * group.dim)
+    copy(group.error, partial.error, lanes * group.dim)
+    copy(group.par, partial.par, lanes * group.parameters)
+    copy(group.velocity, partial.velocity, lanes * group.rows)
+    copy(group.values, partial.values, lanes * group.rows * group.k)
     for lane in range(lanes):
-        side.t0[lane], side.time_low[lane] = time_of_step(
+        partial.t0[lane], partial.time_low[lane] = time_of_step(
             group.t0[lane], group.time_low[lane], float(group.n), group.h[lane]
         )
-        side.h[lane] = part
-        side.alive[lane], side.iterations[lane] = group.alive[lane], 0.0
-        side.rate[lane] = group.rate[lane]  # not that of another partial step
-    side.n = 0
+        partial.h[lane] = part
+        partial.alive[lane], partial.iterations[lane] = group.alive[lane], 0.0
+        partial.rate[lane] = group.rate[lane]  # not that of another partial step
+    partial.n = 0
     length = group.part_indices[sample]
     start = group.k * group.k * length
-    side.matrix = group.part_matrix + start
-    side.extrapolation = group.part_extrapolation + start
-    side.matrix_norm = group.part_norms[length]
-    call_steps(side.code, side, 1)
-    group.living = side.living
+    partial.matrix = group.part_matrix + start
+    partial.extrapolation = group.part_extrapolation + start
+    partial.matrix_norm = group.part_norms[length]
+    call_steps(partial.code, partial, 1)
+    group.living = partial.living
     for lane in range(lanes):
-        group.alive[lane] = side.alive[lane]
-        group.iterations[lane] += side.iterations[lane]
+        group.alive[lane] = partial.alive[lane]
+        group.iterations[lane] += partial.iterations[lane]
 
 
 @compiled
@@ -98,7 +98,7 @@ def run(first, second, budget):
     budget : int
         Steps of groups.
     """
-    group, side = group_at(first), group_at(second)
+    group, partial = group_at(first), group_at(second)
     while group.at < group.end:
         if group.sample < 0:
             load(group)
@@ -116,8 +116,8 @@ def run(first, second, budget):
                 group.sample += 1
             else:
                 budget -= 1
-                part_step(group, side, sample)
-                write(group, side, sample)
+                part_step(group, partial, sample)
+                write(group, partial, sample)
                 group.sample += 1
         unload(group)
     return 1

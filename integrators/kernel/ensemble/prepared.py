@@ -145,11 +145,11 @@ class Lanes:
             "parameters": self.parameters, "k": self.k, "events": 0, **numbers,
         }  # fmt: skip
         matrix = self._matrix(h)
-        group, side = (Group(shape, {**self._fixed, **arrays, "matrix": matrix}) for _ in range(2))
+        group, partial = (Group(shape, {**self._fixed, **arrays, "matrix": matrix}) for _ in range(2))
         group.matrix_norm = float(_norm(matrix))
         group.h[:], group.t0[:] = h, t0
         group.start_time = t0
-        return group, side
+        return group, partial
 
 
 def groups_of(system: System, second: bool, rows: int) -> Blocks:
