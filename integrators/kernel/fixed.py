@@ -102,19 +102,19 @@ class FixedStepper(HBVMStepper):
         ctx, times, states = self._context, [], []
         size, outcome, why, over = self._first_piece, DONE, None, False
         while not over:
-            final, rest = first + most - 1, 0.0
+            final, last_part = first + most - 1, 0.0
             if end is not None:
                 (count,), (part,) = plan(np.array([end]), np.array([ctx.t0]), ctx.h)
-                final, rest = (int(count), part) if count < final else (final, 0.0)
+                final, last_part = (int(count), part) if count < final else (final, 0.0)
             last = min(final, first + size - 1)
             targets = np.arange(first, last + 1)
             t: Array = np.asarray(ctx.t0 + targets * ctx.h, dtype=np.float64)
             parts = np.zeros(targets.size)
             between, at = PARTIAL, t
-            if end is not None and ctx.events.act and rest and last == final:
+            if end is not None and ctx.events.act and last_part and last == final:
                 # What is left of the time is looked at for events that change the state; the sample is none.
                 between, at = DENSE, np.append(t, end)
-                targets, parts = np.append(targets, last), np.append(parts, rest)
+                targets, parts = np.append(targets, last), np.append(parts, last_part)
             made, outcome, why = self._fill(between, at, targets, parts)
             times.append(t[: len(made)])
             states.append(made[: t.size])

@@ -31,8 +31,8 @@ from integrators.kernel.spare import Pair, Spare
 from integrators.kernel.step import fused
 from integrators.kernel.step.engine import steps
 from integrators.kernel.step.rule import (
-    LOG_REST,
-    LOG_REST_VARYING,
+    LOG_RESIDUAL,
+    LOG_RESIDUAL_VARYING,
     LONGEST,
     MOST_TRUSTED,
     PART_OF_TOLERANCE,
@@ -422,7 +422,7 @@ class HBVMProgram(Compiled):
         more = {"energy.rows": self.system.dim + 1} if self.projected else self._more
         context = self.kept.context(self.shape, tables) if self.kept else Context(self.shape, tables, more)
         context.solver.tolerance = TOLERANCE
-        context.solver.log_rest = LOG_REST
+        context.solver.log_residual = LOG_RESIDUAL
         return context
 
     def _put(self, own: Context, partial: Context, par: Array) -> None:
@@ -634,13 +634,13 @@ class AdaptiveProgram(HBVMProgram):
 
     def _new_context(self, *, partial: bool) -> Context:
         context = super()._new_context(partial=True)  # with a matrix of its own
-        context.solver.log_rest = LOG_REST_VARYING
+        context.solver.log_residual = LOG_RESIDUAL_VARYING
         if self._energy:
             context.energy.code = self._energy.address
             context.energy.width = width_of_blocks(self.system)
             context.point({"energy.state_indices": self.shape.state_indices})
             context.solver.tolerance = max(PART_OF_TOLERANCE * self.tol, TOLERANCE)
-            context.solver.log_rest = max(math.log2(context.solver.tolerance), LOG_REST_VARYING)
+            context.solver.log_residual = max(math.log2(context.solver.tolerance), LOG_RESIDUAL_VARYING)
         context.solver.trusted = min(TRUSTED * context.solver.tolerance, MOST_TRUSTED)
         context.solver.log_trusted = math.log2(UNTESTED * context.solver.tolerance)
         context.point({"estimate.estimators": self._estimators, "tables.extrapolation": self._extrapolations})
@@ -703,7 +703,7 @@ class ReversibleProgram(AdaptiveProgram):
 
     def _new_context(self, *, partial: bool) -> Context:
         context = super()._new_context(partial=partial)
-        context.solver.log_rest = LOG_REST
+        context.solver.log_residual = LOG_RESIDUAL
         return context
 
     def renew(self, own: Context, partial: Context, par: Array) -> None:

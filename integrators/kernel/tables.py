@@ -186,7 +186,7 @@ def keep_moments(high: Array, low: Array, basis: Array) -> Array:
     rounded = high.copy()
     k, m = basis.shape
     weights = 0.5 ** np.arange(m)
-    for row, exact, rest in zip(rounded, high, low, strict=True):
+    for row, exact, low_row in zip(rounded, high, low, strict=True):
         far = FARTHEST * np.spacing(np.abs(exact).max())
         # The entries that are rounded most finely, of the whole row and of its parts: of the
         # latter none need move far.
@@ -196,13 +196,13 @@ def keep_moments(high: Array, low: Array, basis: Array) -> Array:
         sets = np.array(list(itertools.combinations(pool, m)))
         inverses = np.linalg.inv(basis[sets].transpose(0, 2, 1))
         for _ in range(3):
-            lost = ((exact - row) + rest) @ basis  # exact - row is exact: they differ by a few units
-            moved = (row[sets] + inverses @ lost) - row[sets]
-            left = lost - np.einsum("si,sij->sj", moved, basis[sets])
+            deficit = ((exact - row) + low_row) @ basis  # exact - row is exact: they differ by a few units
+            moved = (row[sets] + inverses @ deficit) - row[sets]
+            left = deficit - np.einsum("si,sij->sj", moved, basis[sets])
             sizes = np.linalg.norm(left * weights, axis=1)
             sizes[np.abs(moved).max(axis=1) > far] = np.inf
             best = np.argmin(sizes)
-            if sizes[best] >= np.linalg.norm(lost * weights):
+            if sizes[best] >= np.linalg.norm(deficit * weights):
                 break
             row[sets[best]] += moved[best]
     return rounded

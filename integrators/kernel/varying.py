@@ -123,8 +123,8 @@ class AdaptiveStepper(HBVMStepper):
     def _is_at(self, t: float) -> bool:
         """Whether a breakpoint is reached; as `integrators.kernel.step.vary.remaining`."""
         ctx = self._context
-        rest = (t - self.t) - ctx.time_low
-        return abs(rest) <= SHORTEST * max(abs(t), abs(self.t), abs(ctx.controller.length_behind))
+        time_left = (t - self.t) - ctx.time_low
+        return abs(time_left) <= SHORTEST * max(abs(t), abs(self.t), abs(ctx.controller.length_behind))
 
     def _renew(self, par: Array) -> None:
         super()._renew(par)

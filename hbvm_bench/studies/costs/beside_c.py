@@ -48,7 +48,7 @@ def _rule() -> tuple[float, ...]:
 
     return (
         rule.TOLERANCE, rule.ROUNDING, rule.STAGNATION, rule.LEAST, rule.FLOOR, rule.FIRST_RATE,
-        rule.LOG_REST, stopping.LOG_TRUSTED, stopping.LOG_FAST_RATE, stopping.LOG_NEGLIGIBLE,
+        rule.LOG_RESIDUAL, stopping.LOG_TRUSTED, stopping.LOG_FAST_RATE, stopping.LOG_NEGLIGIBLE,
         stopping.LOG_TOTAL_DECREASE,
         stopping.FASTEST, stopping.SLOWEST, stopping.MOST_EXTRA,
     )  # fmt: skip

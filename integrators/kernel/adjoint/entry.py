@@ -74,7 +74,7 @@ def add_slopes(ctx, memory, h):
             for i in range(used):
                 total += ctx.tables.weights[lanes * call + i] * values[lanes * p + i]
             memory.sums[p], low = two_sum(memory.sums[p], h * total)
-            memory.lost[p] += low
+            memory.sums_low[p] += low
 
 
 @compiled

@@ -9,7 +9,7 @@ from integrators.kernel.adjoint.tableau import adjoint
 from integrators.kernel.context import DONE, Context, Shape
 from integrators.kernel.native.field import compile_field
 from integrators.kernel.native.memory import aligned
-from integrators.kernel.step.rule import FIRST_RATE, LOG_REST_VARYING, TOLERANCE
+from integrators.kernel.step.rule import FIRST_RATE, LOG_RESIDUAL_VARYING, TOLERANCE
 from integrators.protocol import Array
 from problems import emit
 from problems.problem import System
@@ -99,7 +99,11 @@ class Adjoint:
             fixed["raw_matrix"] = tables.rounded(self._constants)
         fixed["extrapolation"] = tables.extrapolations(c) if c.route > tables.THROUGH else aligned(0)
         self.context = context = Context(own, fixed, {"padded": 2 * (-(-dim // 8) * 8)})
-        context.solver.tolerance, context.solver.log_rest, context.varying = TOLERANCE, LOG_REST_VARYING, 1
+        context.solver.tolerance, context.solver.log_residual, context.varying = (
+            TOLERANCE,
+            LOG_RESIDUAL_VARYING,
+            1,
+        )
         context.solver.rate = FIRST_RATE
         context.par[:] = par
         self._wanted = parameters and system.n_par > 0
@@ -184,7 +188,7 @@ class Adjoint:
     def gradient(self) -> tuple[Array, Array]:
         """The derivatives with respect to the state now, and to the parameters."""
         memory = self._memory
-        return self.context.read(), memory.sums + memory.lost
+        return self.context.read(), memory.sums + memory.sums_low
 
 
 def _matrix(constants: tables.Constants) -> Array:

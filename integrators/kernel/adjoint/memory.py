@@ -28,4 +28,4 @@ class Pullback(Memory):
     values = Array("room")  # of these products, in one block of stages
     room = Integer()
     sums = Array("parameters")  # the derivatives by parameters,
-    lost = Array("parameters")  # and what they lack
+    sums_low = Array("parameters")  # and what they lack

@@ -258,12 +258,12 @@ class Control:
         self.aim()
         length = w.h * self.factor
         t, low = time_after(self.row("t0"), self.row("time_low"), w.h)
-        rest, since = (self.row("stop") - t) - low, self.row("since") + 1.0
+        time_left, since = (self.row("stop") - t) - low, self.row("since") + 1.0
         good = self.all(
             good,
             self.free,
-            (rest * length).compare(">", 0.0),
-            rest.absolute().compare(">", length.absolute()),
+            (time_left * length).compare(">", 0.0),
+            time_left.absolute().compare(">", length.absolute()),
             length.absolute().compare("<=", self.number("longest")),
             is_distinct(length, t).value,
             since.compare("<", self.row("unwatched")),

@@ -23,8 +23,8 @@ from integrators.kernel.simd.emit import DOUBLE, INTEGER, splat, text_of
 from integrators.kernel.simd.operations import where
 from integrators.kernel.simd.values import Value
 from integrators.kernel.step.rule import (
-    LOG_REST,
-    LOG_REST_VARYING,
+    LOG_RESIDUAL,
+    LOG_RESIDUAL_VARYING,
     MOST_IN_LANES,
     TOLERANCE,
 )
@@ -476,7 +476,8 @@ class Steps(Writer):
         What is judged is the change that the next iteration would make of the stages, beside
         their block: bounded by that of the values.
         """
-        from integrators.kernel.step.stopping import further, judge, left_over, stagnates  # imports numba
+        # Imports numba
+        from integrators.kernel.step.stopping import further, judge, residual_at_end, stagnates
 
         b, form = self.b, self.form
         change, floored = (self.variable(self.kind, self.zero.value) for _ in range(2))
@@ -490,12 +491,12 @@ class Steps(Writer):
         self.each_row(largest)
         strict, best, rate = self.load(change), self.load(self.best), self.load(self.rate)
         count = Value(b, splat(b, b.sitofp(tried, DOUBLE), form.lanes))
-        best, stalled, rate, converged, rest = judge(
+        best, stalled, rate, converged, residual = judge(
             strict, self.load(self.last), best, self.load(self.stalled), rate, count, TOLERANCE, 0.0
         )
         over = converged | stagnates(self.load(floored), stalled)
-        log_rest = LOG_REST_VARYING if form.varying else LOG_REST
-        more = where(over, further(left_over(converged, rest, best), rate, log_rest), INFINITY)
+        log_residual = LOG_RESIDUAL_VARYING if form.varying else LOG_RESIDUAL
+        more = where(over, further(residual_at_end(converged, residual, best), rate, log_residual), INFINITY)
         left = more.where(undecided, self.load(self.left))
         news = (
             (self.last, strict),
@@ -559,11 +560,11 @@ class Steps(Writer):
             middle = form.k // 2
             return half(d, high, low, range(middle)).two_sum(half(d, high, low, range(middle, form.k)))
 
-        def keep(d: Index, new: Value, lost: Value) -> None:
+        def keep(d: Index, new: Value, low: Value) -> None:
             # The last iterations are not judged: in one component of a lane they may have left no number.
             good = b.and_(b.load(self.alive), (new - new).compare("==", 0.0))
             b.store(good, self.alive)
-            for value, base, now in ((new, *ends[0]), (lost, *ends[1])):
+            for value, base, now in ((new, *ends[0]), (low, *ends[1])):
                 self.put(value.where(good, self.get(now, d)), base, d)
 
         def row(d: Index) -> None:

@@ -48,8 +48,8 @@ def keeps_away(search, degree):
     for j in range(0, degree + 8, 8):
         sizes += abs(get(search.coefficients, j))
     constant = abs(search.coefficients[0])
-    rest = total(sizes) - constant
-    return constant - rest > NEAR * (constant + rest)
+    varying_part = total(sizes) - constant
+    return constant - varying_part > NEAR * (constant + varying_part)
 
 
 @compiled

@@ -83,22 +83,22 @@ def solve(lu, pivots, begins, ends, n, x, y):
         exchange(x, 8, c, pivots[c])
         exchange(y, 8, c, pivots[c])
     for r in range(1, n):
-        a, b, more, rest = get(x, 8 * r), get(y, 8 * r), splat8(0.0), splat8(0.0)
+        a, b, a_cross, b_cross = get(x, 8 * r), get(y, 8 * r), splat8(0.0), splat8(0.0)
         for c in range(begins[r], r):
             i = width * r + 16 * c
             u, v, p, q = get(lu, i), get(lu, i + 8), get(x, 8 * c), get(y, 8 * c)
-            a, more = fma(-u, p, a), fma(v, q, more)
-            b, rest = fma(-u, q, b), fma(-v, p, rest)
-        put(x, 8 * r, a + more)
-        put(y, 8 * r, b + rest)
+            a, a_cross = fma(-u, p, a), fma(v, q, a_cross)
+            b, b_cross = fma(-u, q, b), fma(-v, p, b_cross)
+        put(x, 8 * r, a + a_cross)
+        put(y, 8 * r, b + b_cross)
     for r in range(n - 1, -1, -1):
-        a, b, more, rest = get(x, 8 * r), get(y, 8 * r), splat8(0.0), splat8(0.0)
+        a, b, a_cross, b_cross = get(x, 8 * r), get(y, 8 * r), splat8(0.0), splat8(0.0)
         for c in range(r + 1, ends[r] + 1):
             i = width * r + 16 * c
             u, v, p, q = get(lu, i), get(lu, i + 8), get(x, 8 * c), get(y, 8 * c)
-            a, more = fma(-u, p, a), fma(v, q, more)
-            b, rest = fma(-u, q, b), fma(-v, p, rest)
-        a, b = a + more, b + rest
+            a, a_cross = fma(-u, p, a), fma(v, q, a_cross)
+            b, b_cross = fma(-u, q, b), fma(-v, p, b_cross)
+        a, b = a + a_cross, b + b_cross
         u, v = get(lu, width * r + 16 * r), get(lu, width * r + 16 * r + 8)
         put(x, 8 * r, fma(a, u, -b * v))
         put(y, 8 * r, fma(a, v, b * u))

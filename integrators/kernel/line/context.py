@@ -19,7 +19,7 @@ class LineContext(Context):
     every = Integer()  # rows of `found`
     measure = Integer()  # address of what writes the gradients and then the invariants themselves
     gradients = Array("calls", "every", "lanes")  # in the layout of stage memory
-    rest = Array("calls", "every", "lanes")  # what their first s coefficients leave of the rows
+    remainders = Array("calls", "every", "lanes")  # what their first s coefficients leave of the rows
     legendre = Array("coefficient_groups", "every", 8)  # these coefficients
     coefficient_groups = Integer()  # of 8
     onto = Array()  # values -> coefficients
@@ -36,6 +36,6 @@ class LineContext(Context):
     alpha = Array("invariants")
     reference = Array("invariants")  # what the invariants are to be
     owed = Array("invariants")  # what the step ahead is to take back of what rounding took from them
-    lost = Integer()  # times that an invariant had moved by more than rounding accounts for
+    losses = Integer()  # times that an invariant had moved by more than rounding accounts for
     culprit = Integer()  # the invariant that is none,
     change_rate = Real()  # and its rate of change beside the terms of that

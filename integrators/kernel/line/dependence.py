@@ -11,7 +11,8 @@ from problems.problem import System
 
 SHIFT = 3e-3  # of the time in which the state changes by its own size: how far the neighbours are
 DEPENDENT = 1e-9  # what is left of a gradient, relative to it, when it depends on others
-NEARLY = 0.1  # the first of the invariants is taken whose rest is no smaller than this part of the largest
+# The first of the invariants is taken whose remainder is no smaller than this part of the largest
+NEARLY = 0.1
 
 
 def independent(
@@ -48,21 +49,22 @@ def independent(
         rate = float(np.abs(slope).max() / np.abs(y).max())
         shift = SHIFT / rate if 0.0 < rate < np.inf else 0.0
         points = [y, *(_moved(lambda s, x: function(s, x, par)[:dim], t, y, h) for h in (shift, -shift))]
-        rests = np.stack([function(t, point, par)[dim:].reshape(-1, dim) for point in points])
-        rests = rests * np.sqrt(metric)
-        rests /= _power_of_two(np.abs(rests).max(axis=(0, 2)))[:, None]  # so that squares have doubles
-    chosen = np.zeros(rests.shape[1], dtype=bool)
-    if not np.isfinite(rests).all():
+        remainders = np.stack([function(t, point, par)[dim:].reshape(-1, dim) for point in points])
+        remainders = remainders * np.sqrt(metric)
+        # So that squares have doubles
+        remainders /= _power_of_two(np.abs(remainders).max(axis=(0, 2)))[:, None]
+    chosen = np.zeros(remainders.shape[1], dtype=bool)
+    if not np.isfinite(remainders).all():
         return ~chosen
-    sizes = np.linalg.norm(rests, axis=2)
+    sizes = np.linalg.norm(remainders, axis=2)
     sizes[sizes == 0.0] = 1.0
     for _ in range(chosen.size):
-        left = np.where(chosen, 0.0, (np.linalg.norm(rests, axis=2) / sizes).max(axis=0))
+        left = np.where(chosen, 0.0, (np.linalg.norm(remainders, axis=2) / sizes).max(axis=0))
         if left.max() <= DEPENDENT:
             break
         pick = int(np.flatnonzero(left >= NEARLY * left.max())[0])
         chosen[pick] = True
-        for point in rests:
+        for point in remainders:
             length = np.linalg.norm(point[pick])
             if length > 0.0:
                 unit = point[pick] / length

@@ -69,11 +69,11 @@ def end(ctx):
         for i in range(ctx.k):
             value = values[group_offset(i // 8, block, lanes) + lanes * d + i % 8]
             term = weights[i] * value
-            mean, lost = two_sum(mean, term)
-            low += lost + fma(weights[i], value, -term) + weights_low[i] * value
+            mean, rounding = two_sum(mean, term)
+            low += rounding + fma(weights[i], value, -term) + weights_low[i] * value
         if several:
-            mean, lost = two_sum(mean, -correction(ctx, d))
-            low += lost
+            mean, rounding = two_sum(mean, -correction(ctx, d))
+            low += rounding
         ctx.next_state[d], ctx.next_error[d] = added(state[d], error[d], h, mean, low)
         damage += ctx.next_state[d] * 0.0
     return DONE if damage == 0.0 else NOT_FINITE

@@ -55,7 +55,7 @@ def keep_invariants(ctx):
     lanes, every, dim, n = ctx.lanes, ctx.every, ctx.rows, ctx.invariants
     width, groups, chunks = dim * (1 + n), ctx.coefficient_groups, ctx.chunks
     multiply(ctx.onto, groups, chunks, ctx.gradients, lanes, ctx.legendre, 8, width, every)
-    multiply(ctx.back, chunks, groups, ctx.legendre, 8, ctx.rest, lanes, width, every)
+    multiply(ctx.back, chunks, groups, ctx.legendre, 8, ctx.remainders, lanes, width, every)
     set_gram(ctx)
     set_right(ctx)
     alpha, right, owed, h = ctx.alpha, ctx.right, ctx.owed, ctx.h
@@ -97,15 +97,15 @@ def set_right(ctx):
     lanes, dim, terms, weights = ctx.lanes, ctx.rows, ctx.terms, ctx.tables.weights
     width = dim * (1 + ctx.invariants)
     for chunk in range(ctx.chunks):
-        sums, rest = ctx.gradients + row(ctx, chunk), ctx.rest + row(ctx, chunk)
+        sums, remainders = ctx.gradients + row(ctx, chunk), ctx.remainders + row(ctx, chunk)
         for d in range(width):
-            put(rest, lanes * d, get(sums, lanes * d) - get(rest, lanes * d))
+            put(remainders, lanes * d, get(sums, lanes * d) - get(remainders, lanes * d))
     for a in range(ctx.invariants):
         for d in range(dim):
             products = splat8(0.0)
             for chunk in range(ctx.chunks):
-                rest = ctx.rest + row(ctx, chunk)
-                product = get(rest, lanes * d) * get(rest, lanes * (dim * (1 + a) + d))
+                remainders = ctx.remainders + row(ctx, chunk)
+                product = get(remainders, lanes * d) * get(remainders, lanes * (dim * (1 + a) + d))
                 products += get(weights, 8 * chunk) * product
             terms[d] = -total(products)
         ctx.right[a] = ordered(ctx)
@@ -155,19 +155,25 @@ def measure_gap(ctx):
     counted and stays lost: the invariants are then kept at what they are now. At a start without a
     past they are what they are. Uses the first stages, which the step behind does not need any more.
     """
-    rest, reference, owed, active, terms = ctx.rest, ctx.reference, ctx.owed, ctx.active, ctx.terms
+    remainders, reference, owed, active, terms = (
+        ctx.remainders,
+        ctx.reference,
+        ctx.owed,
+        ctx.active,
+        ctx.terms,
+    )
     state, error, lanes, dim, n = ctx.state, ctx.error, ctx.lanes, ctx.rows, ctx.invariants
     for lane in range(lanes):
         ctx.times[lane] = ctx.t0
         for d in range(dim):
             ctx.stages[lanes * d + lane] = state[d]
-    call_field(ctx.measure, ctx.times, ctx.stages, ctx.par, rest)
+    call_field(ctx.measure, ctx.times, ctx.stages, ctx.par, remainders)
     for a in range(n):
-        value = rest[lanes * (dim * n + a)]
+        value = remainders[lanes * (dim * n + a)]
         gap = value - reference[a]
         scale = abs(value) + abs(reference[a])
         for d in range(dim):
-            slope = rest[lanes * (dim * a + d)]
+            slope = remainders[lanes * (dim * a + d)]
             scale += abs(slope) * (abs(state[d]) + abs(ctx.length) * steepest(ctx, d))
             terms[d] = slope * error[d]
         gap += ordered(ctx)
@@ -177,7 +183,7 @@ def measure_gap(ctx):
             gap = 0.0
         elif not abs(gap) <= ROUNDING * scale:
             reference[a], gap = value, 0.0
-            ctx.lost += 1
+            ctx.losses += 1
         owed[a] = GAIN * gap
 
 

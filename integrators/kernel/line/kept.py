@@ -98,7 +98,7 @@ class Kept:
         if not self.names:
             return {}
         left_out = [name for name, on in zip(self.names, context.active, strict=True) if not on]
-        return {"lost": context.lost, "left_out": left_out}
+        return {"lost": context.losses, "left_out": left_out}
 
     def refusal(self, contexts: tuple[Any, Any], t: float) -> str:
         """Return why the step from t has ended as `NOT_KEPT`: the step of a pair of contexts, or a part."""
@@ -111,7 +111,7 @@ class Kept:
     def load(self, contexts: tuple[Any, Any], y: Array, par: Array, t0: float) -> None:
         """Put into a pair of contexts what follows from the start (t0, y) and from the parameters."""
         own, partial = contexts
-        own.lost = own.change_rate = partial.change_rate = 0
+        own.losses = own.change_rate = partial.change_rate = 0
         if self.names:
             own.metric[:] = metric_of(self.system, par)
             own.active[:] = independent(self.system, self.values, own.metric, y, par, t0)

@@ -11,10 +11,10 @@ def keep_energy(ctx):
     """Set ``values`` to B(Y_l) sum_i P_i(c_l) G_i with the Legendre coefficients G of grad H."""
     dim, lanes, every = ctx.rows, ctx.lanes, ctx.every
     multiply(ctx.onto, ctx.coefficient_groups, ctx.chunks, ctx.gradients, lanes, ctx.legendre, 8, dim, every)
-    multiply(ctx.back, ctx.chunks, ctx.coefficient_groups, ctx.legendre, 8, ctx.rest, lanes, dim, every)
+    multiply(ctx.back, ctx.chunks, ctx.coefficient_groups, ctx.legendre, 8, ctx.remainders, lanes, dim, every)
     for chunk in range(ctx.chunks):
         start = group_offset(chunk, every * lanes, lanes)
-        structure, slope = ctx.gradients + start, ctx.rest + start
+        structure, slope = ctx.gradients + start, ctx.remainders + start
         values = ctx.values + offset(ctx, chunk)
         for d in range(dim):
             value = splat8(0.0)

@@ -26,4 +26,4 @@ class Controller(Part):
     breaks = Integer()  # 1: `stop` is a time at which the field may jump
     attempts = Integer()  # at the step ahead that were rejected
     rejected = Integer()  # 1: `Context.values` are of a rejected step of `length`, from the present state
-    restful = Integer()  # 1: the field at the start tells no time scale
+    no_time_scale = Integer()  # 1: the field at the start tells no time scale

@@ -142,8 +142,8 @@ def _log(x: Value) -> Value:
     s = f / (f + 2.0)
     z = s * s
     half = f * f * 0.5
-    rest = z * z.polynomial(LOGARITHM)
-    low = (s * (half + rest)) + k * LN2_SHORT[1]
+    series = z * z.polynomial(LOGARITHM)
+    low = (s * (half + series)) + k * LN2_SHORT[1]
     value = k * LN2_SHORT[0] - ((half - low) - f)
     value = x.constant(-math.inf).where(x.compare("==", 0.0), value)
     value = value.where(x.compare(">=", 0.0), math.nan)

@@ -149,17 +149,17 @@ def sums(typing, v0, v1, v2, v3, v4, v5, v6, v7):
 
 
 @intrinsic
-def sums_and_rests(typing, v0, v1, v2, v3, v4, v5, v6, v7):
+def sums_and_errors(typing, v0, v1, v2, v3, v4, v5, v6, v7):
     """Return `sums` of eight vectors, and what the last two additions of each round away."""
 
     def generate(context, builder, sig, args):
         first, second, last = FOLDS
         four = [builder.fadd(*_halves(builder, args[i], args[i + 4], first[1:])) for i in range(4)]
         two = [added(builder, *_halves(builder, four[i], four[i + 2], second[1:])) for i in range(2)]
-        (high, lost), (other, more) = two
-        total, rest = added(builder, *_halves(builder, high, other, last[1:]))
-        less = builder.fadd(*_halves(builder, lost, more, last[1:]))
-        return context.make_tuple(builder, sig.return_type, [total, builder.fadd(rest, less)])
+        (high, low), (other, more) = two
+        total, error = added(builder, *_halves(builder, high, other, last[1:]))
+        less = builder.fadd(*_halves(builder, low, more, last[1:]))
+        return context.make_tuple(builder, sig.return_type, [total, builder.fadd(error, less)])
 
     return types.UniTuple(EIGHT, 2)(*[EIGHT] * 8), generate
 

@@ -83,10 +83,10 @@ def prepare(ctx):
         return
     row_drift, row_drift_low, factor = scratch.row_drift, scratch.row_drift_low, ctx.factors.drift
     for i in range((rows + 3) // 4):
-        z, e, kh = get(state, 8 * i), get(error, 8 * i), get(factor, 8 * i)
-        moved, moved_low = multiplied(kh, z, e)
+        z, z_low, kh = get(state, 8 * i), get(error, 8 * i), get(factor, 8 * i)
+        moved, moved_low = multiplied(kh, z, z_low)
         put_upper(row_state, 4 * i, z)
-        put_upper(row_error, 4 * i, e)
+        put_upper(row_error, 4 * i, z_low)
         put_lower(row_drift, 4 * i, moved)
         put_lower(row_drift_low, 4 * i, moved_low)
     nodes, nodes_low = ctx.tables.nodes, ctx.tables.nodes_low

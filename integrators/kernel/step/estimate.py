@@ -34,7 +34,7 @@ BESIDE_NOTHING = 1e3
 OUTSIDE = 100.0  # times the last coefficients: a smooth field is no farther from its polynomial at the ends
 # A component's low coefficients that are larger than this part of all do not fall off, and are those of a
 # mode at rest where the error they would make is at most that part of the allowed one; see `log_decay`.
-RESTLESS, RESTING = 0.1, 0.1
+NOT_DECAYING, AT_REST = 0.1, 0.1
 ALIKE = 1e-14  # part of the field's mean that its other coefficients are at most where it does not change
 
 
@@ -429,9 +429,9 @@ def log_decay(ctx):
         last, size = gammas[GAMMA_3], block_size(ctx, b)
         if steps == 3:
             last = next_coefficient(last, gammas[GAMMA_2], ctx.estimate.error_decay)
-        if last > RESTLESS * ctx.estimate.slope[b]:
+        if last > NOT_DECAYING * ctx.estimate.slope[b]:
             slope = floored_slope(ctx.estimate.slope[b], steepest_in_group(ctx, b), ctx.estimate.least_slope)
-            if local_error(h, last, slope, size) <= RESTING * ctx.controller.allowed_error:
+            if local_error(h, last, slope, size) <= AT_REST * ctx.controller.allowed_error:
                 continue
         if is_visible(
             h, next_coefficient(gammas[AT_ERROR], gammas[BEFORE_ERROR], ctx.estimate.error_decay), size
@@ -461,8 +461,8 @@ def estimate_implicit(ctx):
 def first_length(ctx):
     """Return a first step from the field at the state: short, the following grow.
 
-    Where the state is 0, or the field is 0 or infinite, there is no time scale: `Controller.restful` is 1
-    then, and the step the shorter one of what it would be with a unit for the state and a part of the
+    Where the state is 0, or the field is 0 or infinite, there is no time scale: `Controller.no_time_scale` is
+    1 then, and the step the shorter one of what it would be with a unit for the state and a part of the
     interval.
     """
     controller = ctx.controller
@@ -485,7 +485,7 @@ def first_length(ctx):
     if position > 0.0:
         rate = max(speed / position, (pull / position) ** 0.5)
     length = controller.allowed_error ** (1.0 / (2.0 * controller.error_degree + 1.0))
-    controller.restful = 0 if position > 0.0 and 0.0 < rate < INFINITY else 1
+    controller.no_time_scale = 0 if position > 0.0 and 0.0 < rate < INFINITY else 1
     return max(length / rate, RESTART * abs(ctx.t0)) if 0.0 < rate < INFINITY else length
 
 
@@ -494,5 +494,5 @@ def shorten_first(ctx):
     """Let the first step be a part of the interval at most where nothing else tells how long it may be."""
     controller = ctx.controller
     most = FIRST_AT_REST * controller.interval
-    if controller.restful and 0.0 < most < abs(controller.next_length):
+    if controller.no_time_scale and 0.0 < most < abs(controller.next_length):
         controller.next_length = most if controller.next_length > 0.0 else -most

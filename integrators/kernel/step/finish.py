@@ -8,7 +8,7 @@ the errors of all sums and products makes the walk a fifth smaller, and steps of
 
 from integrators.kernel.context import ARRIVE, BY_INCREMENT, DONE, END, NOT_FINITE, UNSOLVED
 from integrators.kernel.native.jit import compiled, for_both_widths
-from integrators.kernel.simd.memory import call_line, get, put, splat8, sums_and_rests, swap, total
+from integrators.kernel.simd.memory import call_line, get, put, splat8, sums_and_errors, swap, total
 from integrators.kernel.simd.operations import fma, two_sum
 from integrators.kernel.step.projection import project_onto_energy
 from integrators.kernel.step.stages import offset
@@ -35,7 +35,7 @@ def weighted(ctx, row, high, low):
 
 @compiled
 def impulses(ctx, d):
-    """For the rows d .. d+3, means of the force with the weights b, then the position's, and their rests."""
+    """For the rows d .. d+3, means of the force with the weights b, then the position's, and low parts."""
     tables = ctx.tables
     b, b_low, w, w_low = (
         tables.weights,
@@ -43,7 +43,7 @@ def impulses(ctx, d):
         tables.position_weights,
         tables.position_weights_low,
     )
-    return sums_and_rests(
+    return sums_and_errors(
         weighted(ctx, d, b, b_low), weighted(ctx, d + 1, b, b_low),
         weighted(ctx, d + 2, b, b_low), weighted(ctx, d + 3, b, b_low),
         weighted(ctx, d, w, w_low), weighted(ctx, d + 1, w, w_low),
@@ -53,9 +53,9 @@ def impulses(ctx, d):
 
 @compiled
 def means(ctx, d):
-    """For the rows d .. d+7, the means of the field with the weights b, and their rests."""
+    """For the rows d .. d+7, the means of the field with the weights b, and their low parts."""
     b, low = ctx.tables.weights, ctx.tables.weights_low
-    return sums_and_rests(
+    return sums_and_errors(
         weighted(ctx, d, b, low), weighted(ctx, d + 1, b, low),
         weighted(ctx, d + 2, b, low), weighted(ctx, d + 3, b, low),
         weighted(ctx, d + 4, b, low), weighted(ctx, d + 5, b, low),
@@ -64,38 +64,38 @@ def means(ctx, d):
 
 
 @for_both_widths
-def added(state, error, h, mean, rest):
-    """Return the state after an increment of h times a mean + rest, and what it lacks.
+def added(state, error, h, mean, low):
+    """Return the state after an increment of h times a mean + low, and what it lacks.
 
     Parameters
     ----------
     state, error : float
         A component before the step, and what it lacks.
     """
-    increment, rest = multiplied(h, mean, rest)
-    moved, lost = two_sum(state, increment)
-    return two_sum(moved, error + (rest + lost))
+    increment, low = multiplied(h, mean, low)
+    moved, rounding = two_sum(state, increment)
+    return two_sum(moved, error + (low + rounding))
 
 
 @for_both_widths
-def moved_by(state, error, moved, moved_low, h, factor, mean, rest):
+def moved_by(state, error, moved, moved_low, h, factor, mean, low):
     """As `added`, of what also drifts, by moved + moved_low, and whose increment has another factor.
 
     Positions are moved like that in the second-order form, with the factor h q' / p.
     """
-    drifted, left = two_sum(state, moved)
-    increment, rest = multiplied(h, mean, rest)
-    increment, rest = multiplied(factor, increment, rest)
-    whole, lost = two_sum(drifted, increment)
-    return two_sum(whole, ((moved_low + error) + left) + (rest + lost))
+    drifted, drift_rounding = two_sum(state, moved)
+    increment, low = multiplied(h, mean, low)
+    increment, low = multiplied(factor, increment, low)
+    whole, rounding = two_sum(drifted, increment)
+    return two_sum(whole, ((moved_low + error) + drift_rounding) + (low + rounding))
 
 
 @compiled
 def add(ctx, i, increment):
     """Add an increment to component i of the state; return 0 if it is finite then."""
-    new, lost = two_sum(ctx.state[i], increment + ctx.error[i])
+    new, rounding = two_sum(ctx.state[i], increment + ctx.error[i])
     ctx.next_state[i] = new
-    ctx.next_error[i] = lost
+    ctx.next_error[i] = rounding
     return new * 0.0
 
 
@@ -127,19 +127,21 @@ def finish_unprojected(ctx):
     if ctx.second:
         factor, kick = ctx.factors.drift, ctx.factors.kick
         for i in range((rows + 3) // 4):
-            z, e, kh = get(state, 8 * i), get(error, 8 * i), get(factor, 8 * i)
-            moved, moved_low = multiplied(kh, z, e)
-            force, rest = impulses(ctx, 4 * i)
-            new, lost = moved_by(z, e, swap(moved), swap(moved_low), splat8(h), get(kick, 8 * i), force, rest)
+            z, z_low, kh = get(state, 8 * i), get(error, 8 * i), get(factor, 8 * i)
+            moved, moved_low = multiplied(kh, z, z_low)
+            force, low = impulses(ctx, 4 * i)
+            new, rounding = moved_by(
+                z, z_low, swap(moved), swap(moved_low), splat8(h), get(kick, 8 * i), force, low
+            )
             put(next_state, 8 * i, new)
-            put(next_error, 8 * i, lost)
+            put(next_error, 8 * i, rounding)
             damage += new * 0.0
     else:
         for i in range((rows + 7) // 8):
-            mean, rest = means(ctx, 8 * i)
-            new, lost = added(get(state, 8 * i), get(error, 8 * i), splat8(h), mean, rest)
+            mean, low = means(ctx, 8 * i)
+            new, rounding = added(get(state, 8 * i), get(error, 8 * i), splat8(h), mean, low)
             put(next_state, 8 * i, new)
-            put(next_error, 8 * i, lost)
+            put(next_error, 8 * i, rounding)
             damage += new * 0.0
     return DONE if total(damage) == 0.0 else NOT_FINITE
 

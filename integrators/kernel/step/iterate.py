@@ -6,7 +6,7 @@ from integrators.kernel.step.begin import INFINITY, rewind, start_plain
 from integrators.kernel.step.fixed_point import iterate_and_evaluate, iterate_measured
 from integrators.kernel.step.rule import MOST_ITERATIONS
 from integrators.kernel.step.size import SIZES_LAST, change, take_sizes
-from integrators.kernel.step.stopping import further, judge, left_over, stagnates, untested_next
+from integrators.kernel.step.stopping import further, judge, residual_at_end, stagnates, untested_next
 
 
 @compiled
@@ -17,7 +17,7 @@ def test(ctx, moved):
     solver.tests += 1
     if blocks.age == 0:
         take_sizes(ctx)
-    best, stalled, solver.rate, converged, rest = judge(
+    best, stalled, solver.rate, converged, residual = judge(
         moved,
         last,
         solver.best,
@@ -35,7 +35,7 @@ def test(ctx, moved):
     if stalled > 0.0 and blocks.age < SIZES_LAST and ctx.varying == 0:
         take_sizes(ctx)  # of now: what has grown since is moved by more rounding
     if converged or (stalled > 0.0 and stagnates(change(ctx, blocks.floored_weights), stalled)):
-        left = left_over(converged, rest, best)
+        left = residual_at_end(converged, residual, best)
         if left > 0.0:
             extra_iterations(ctx, left)
         else:
@@ -52,7 +52,7 @@ def extra_iterations(ctx, change):
     stages that they were taken at.
     """
     solver = ctx.solver
-    iterate_and_evaluate(ctx, int(further(change, solver.rate, solver.log_rest)))
+    iterate_and_evaluate(ctx, int(further(change, solver.rate, solver.log_residual)))
     solver.outcome = DONE
 
 

@@ -36,8 +36,8 @@ def look_first(ctx):
 def approach(ctx, t, budget):
     """Take adaptive steps to the last one before t; return the outcome, and what is left to do."""
     while True:
-        rest, begin = remaining(ctx, t), ctx.t0
-        if rest == 0.0:
+        time_left, begin = remaining(ctx, t), ctx.t0
+        if time_left == 0.0:
             if confirm_previous_step(ctx):
                 return DONE, budget
             continue
@@ -45,12 +45,12 @@ def approach(ctx, t, budget):
         if outcome != DONE:
             return outcome, budget
         if ctx.t0 != begin:  # the step behind was undone
-            rest = remaining(ctx, t)
-        rest, h = abs(rest), abs(ctx.h)
-        inside = rest < h - TIME_TOLERANCE * abs(t)
-        if (watched(ctx) or (inside and rest > (1.0 - ctx.tables.nodes[0]) * h)) and not is_smooth_to_end(
-            ctx
-        ):
+            time_left = remaining(ctx, t)
+        time_left, h = abs(time_left), abs(ctx.h)
+        inside = time_left < h - TIME_TOLERANCE * abs(t)
+        if (
+            watched(ctx) or (inside and time_left > (1.0 - ctx.tables.nodes[0]) * h)
+        ) and not is_smooth_to_end(ctx):
             continue
         outcome = look_first(ctx)
         if outcome != DONE:
@@ -58,7 +58,7 @@ def approach(ctx, t, budget):
         if ctx.solved == UNSOLVED:  # an event at its start has changed the state
             continue
         h = abs(ctx.h)
-        inside = rest < h - TIME_TOLERANCE * abs(t)
+        inside = time_left < h - TIME_TOLERANCE * abs(t)
         if inside:
             return DONE, budget
         if budget == 0:

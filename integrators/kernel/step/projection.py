@@ -74,8 +74,8 @@ def project_onto_energy(ctx):
         factor = -gap / steepness
         for i in range(rows):
             j = state_indices[i]
-            new, lost = two_sum(state[j], factor * slope[8 * i] + error[j])
+            new, low = two_sum(state[j], factor * slope[8 * i] + error[j])
             state[j] = new
-            error[j] = lost
+            error[j] = low
         if gap * gap <= SMALL * steepness:
             return

@@ -61,7 +61,7 @@ def begin_pace(ctx):
     rate = find_slope(ctx)
     half = 0.5 * ctx.pace.epsilon * ctx.pace.density_slope / rate
     set_pace(ctx, log(rate) - half, log(rate) + half)
-    ctx.controller.restful = 0
+    ctx.controller.no_time_scale = 0
 
 
 @compiled

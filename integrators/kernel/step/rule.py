@@ -36,7 +36,7 @@ TOTAL_DECREASE = 1e15
 # Kepler's and Henon and Heiles' problems does in 1e5 to 3e5. With 3e-16 these lose 1e-18 in each step, with
 # 3e-15 3 to 8e-18. At loose tolerances it is seen: a pendulum's energy grows by 2.3e-18 in each step of
 # HBVM(12, 6) at 1e-8, and not with 3e-19, which excites fast oscillations at rest, though.
-LOG_REST, LOG_REST_VARYING = log2(3e-19), log2(3e-17)
+LOG_RESIDUAL, LOG_RESIDUAL_VARYING = log2(3e-19), log2(3e-17)
 # Iterations after which a start is given up: for one without extrapolation, or, if it was one, for a shorter
 # step or the implicit solver. In lanes all the others wait; there a trajectory that has had twice as many
 # leaves, and is computed alone.

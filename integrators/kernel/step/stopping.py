@@ -59,7 +59,7 @@ def judge(change, last, best, stalled, rate, tried, tolerance, resolution):
     best, stalled, rate : float
         With this change.
     converged : bool
-    rest : float
+    residual : float
         What is left of it then.
     """
     size = binary_log(greatest(change, LEAST))
@@ -124,9 +124,9 @@ def rate_unseen(rate):
 
 
 @for_both_widths
-def takes_too_long(change, rate, tries, log_rest, target):
+def takes_too_long(change, rate, tries, log_residual, target):
     """Whether a shorter step is cheaper than to iterate on, after a trial; ``target``: so many iterations."""
-    return (tries >= TRIAL) & (tries + (log_rest - change) / rate > MOST_TIMES * target)
+    return (tries >= TRIAL) & (tries + (log_residual - change) / rate > MOST_TIMES * target)
 
 
 @for_both_widths
@@ -145,18 +145,18 @@ def stagnates(change, stalled):
 
 
 @for_both_widths
-def left_over(converged, rest, best):
+def residual_at_end(converged, residual, best):
     """Return what is left of the changes of an iteration that is over, in which the smallest was ``best``.
 
     0 where another iteration must not be made: beside the others the block is nothing, and may be growing.
     """
-    return where(converged, rest, where(best <= STAGNATION, best, 0.0))
+    return where(converged, residual, where(best <= STAGNATION, best, 0.0))
 
 
 @for_both_widths
-def further(change, rate, log_rest):
+def further(change, rate, log_residual):
     """Return how many more evaluations, at the newest stages, leave next to nothing of a change.
 
-    What is left of it acts on the energy in the same direction in every step; see `LOG_REST`.
+    What is left of it acts on the energy in the same direction in every step; see `LOG_RESIDUAL`.
     """
-    return least(greatest((log_rest - binary_log(change)) / rate, 0.0), MOST_EXTRA)
+    return least(greatest((log_residual - binary_log(change)) / rate, 0.0), MOST_EXTRA)

@@ -8,25 +8,25 @@ from integrators.kernel.simd.operations import fma, two_sum
 def time_of_step(t0, time_low, n, h):
     """Return the time after n steps of length h, t0 + time_low + n h, and what it lacks."""
     elapsed = n * h
-    t, lost = two_sum(t0, elapsed)
-    return t, lost + fma(n, h, -elapsed) + time_low
+    t, low = two_sum(t0, elapsed)
+    return t, low + fma(n, h, -elapsed) + time_low
 
 
 @for_both_widths
 def time_after(t0, time_low, h):
     """Return the time after a step of length h, t0 + time_low + h, and what it lacks."""
-    t, lost = two_sum(t0, h)
-    return two_sum(t, lost + time_low)
+    t, low = two_sum(t0, h)
+    return two_sum(t, low + time_low)
 
 
 @for_both_widths
-def multiplied(factor, x, rest):
-    """Return a factor times x + rest, as a number and a rest.
+def multiplied(factor, x, low):
+    """Return a factor times x + low, as a number and its low part.
 
     With the factor kh and a momentum: the drift, by which a position moves in a step without a force.
     """
     product = factor * x
-    return product, fma(factor, rest, fma(factor, x, -product))
+    return product, fma(factor, low, fma(factor, x, -product))
 
 
 @for_both_widths

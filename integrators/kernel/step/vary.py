@@ -128,7 +128,7 @@ def iterate(ctx):
         if solver.outcome == RUNNING:
             if moved <= trusted:
                 extra_iterations(ctx, moved)
-            elif takes_too_long(change, rate, tries, solver.log_rest, TARGET_ITERATIONS):
+            elif takes_too_long(change, rate, tries, solver.log_residual, TARGET_ITERATIONS):
                 solver.outcome = DIVERGED  # not yet, but a shorter step is cheaper
                 solver.rate = known
     return close(ctx)
@@ -218,10 +218,10 @@ def remaining(ctx, t):
     """
     controller = ctx.controller
     t0 = ctx.t0
-    rest = (t - t0) - ctx.time_low
+    time_left = (t - t0) - ctx.time_low
     size = max(max(abs(t), abs(t0)), abs(controller.length_behind))
     close = SHORTEST if t == controller.stop else TIME_TOLERANCE
-    return 0.0 if abs(rest) <= close * size or rest * controller.next_length < 0.0 else rest
+    return 0.0 if abs(time_left) <= close * size or time_left * controller.next_length < 0.0 else time_left
 
 
 @compiled
@@ -231,9 +231,9 @@ def within(ctx, h):
     if abs(h) > longest:
         h = longest if h > 0.0 else -longest
     if abs(stop) < INFINITY:
-        rest = remaining(ctx, stop)
-        if abs(h) > abs(rest):
-            h = rest
+        time_left = remaining(ctx, stop)
+        if abs(h) > abs(time_left):
+            h = time_left
     return h
 
 
@@ -473,7 +473,7 @@ def take(ctx):
     behind.state, ctx.state, ctx.next_state = ctx.state, ctx.next_state, behind.state
     behind.error, ctx.error, ctx.next_error = ctx.error, ctx.next_error, behind.error
     count_step(ctx)
-    ctx.n = controller.restful = 0
+    ctx.n = controller.no_time_scale = 0
     if ctx.estimate.asks < 0:
         ctx.estimate.asks = ctx.estimate.asks + 1 if ctx.estimate.asks < -1 else 1
     ctx.t0 = t

@@ -72,7 +72,7 @@ class Group:
         for context, base in zip((self.own, self.partial), contexts, strict=True):
             context.point_to(base.used_tables)
             solver = context.solver
-            solver.tolerance, solver.log_rest = base.solver.tolerance, base.solver.log_rest
+            solver.tolerance, solver.log_residual = base.solver.tolerance, base.solver.log_residual
             solver.rate, context.varying = FIRST_RATE, base.varying
         self._state = self.own.state  # where it lies as long as no step is taken
         self._slots = {

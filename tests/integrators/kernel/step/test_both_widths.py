@@ -17,7 +17,7 @@ from integrators.kernel.step.control import as_errors_allow, as_iterations_allow
 from integrators.kernel.step.estimate import is_gap, is_visible, judged, local_error, size_in_step
 from integrators.kernel.step.finish import added, moved_by
 from integrators.kernel.step.size import inverse_sizes, speed_of
-from integrators.kernel.step.stopping import further, judge, left_over, stagnates, untested
+from integrators.kernel.step.stopping import further, judge, residual_at_end, stagnates, untested
 from integrators.kernel.step.sums import multiplied, time_after
 
 LANES, ROWS = 8, 8
@@ -27,7 +27,7 @@ def stopping(t, y, par, out):
     best, stalled, rate, converged, rest = judge(y[0], y[1], y[2], y[3], -y[4], y[5], y[6], 0.0)
     over = converged | stagnates(y[7], stalled)
     out[0], out[1], out[2] = best, stalled, rate
-    out[3] = where(over, further(left_over(converged, rest, best), rate, -61.0), -1.0)
+    out[3] = where(over, further(residual_at_end(converged, rest, best), rate, -61.0), -1.0)
 
 
 def sizes(t, y, par, out):

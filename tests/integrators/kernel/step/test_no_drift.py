@@ -68,9 +68,9 @@ def test_nor_does_it_change_in_lanes(system, of, program, most):
 
 @pytest.mark.parametrize(
     ("system", "of", "program", "most"),
-    # Measured, with standard errors; with 3e-19 left of a change instead of 3e-17 (`LOG_REST_VARYING`), for
-    # 13 to 24 % more iterations. The residual of the iteration is seen in the first case and the last. The
-    # bounds are three standard errors beyond the mean.
+    # Measured, with standard errors; with 3e-19 left of a change instead of 3e-17 (`LOG_RESIDUAL_VARYING`),
+    # for 13 to 24 % more iterations. The residual of the iteration is seen in the first case and the last.
+    # The bounds are three standard errors beyond the mean.
     [
         (CUBIC, cubic, {"k": 8, "s": 7, "tol": 1e-14}, 1.5e-19),  # -1.19 +- 0.10e-19; 0.0 +- 0.1e-19
         (CUBIC, cubic, {"k": 12, "s": 7, "tol": 1e-14}, 5.5e-20),  # -0.2 +- 0.1e-19; 0.0 +- 0.1e-19
