@@ -36,7 +36,8 @@ def in_powers(k: int) -> list[list[float]]:
     return [[float(powers[j][m]) for j in range(m, k, 2)] for m in range(k)]
 
 
-MEASURED = "size", "moved", "strict", "floored"  # rooms that the iteration does not need any more
+# Rooms that the iteration does not need any more
+MEASURED = "size", "moved", "block_weights", "floored_weights"
 
 
 class Control:

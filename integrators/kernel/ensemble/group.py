@@ -55,8 +55,9 @@ class Group(Memory):
     field_values = Array("rows", "lanes")  # the field there
     factor = Array("rows", "lanes")
     moved = Array("rows", "lanes")  # how much the values of a row have changed
-    strict = Array("rows", "lanes")  # what that is beside the row's block,
-    floored = Array("rows", "lanes")  # and beside its block, small ones raised to a part of the largest
+    block_weights = Array("rows", "lanes")  # what that is beside the row's block,
+    # and beside its block, small ones raised to a part of the largest
+    floored_weights = Array("rows", "lanes")
     size = Array("rows", "lanes")
 
     # --- adaptive steps ---

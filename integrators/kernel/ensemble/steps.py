@@ -122,8 +122,8 @@ class Steps(Writer):
     par: Any
     factor: Any
     moved: Any
-    strict: Any
-    floored: Any
+    block_weights: Any
+    floored_weights: Any
     size: Any
     stage: Any
     field_values: Any
@@ -151,7 +151,7 @@ class Steps(Writer):
             setattr(self, name, self.array(slots[name]))
         for name in ("state", "error", "velocity", "par"):
             setattr(self, name, self.array(slots[name]))
-        for name in ("factor", "moved", "strict", "floored", "size", "stage", "field_values"):
+        for name in ("factor", "moved", "block_weights", "floored_weights", "size", "stage", "field_values"):
             setattr(self, name, self.room(slots[name], rows))
         self.held = self.unrolled and machine.many_registers()
         self.values = self.room(slots["values"], k * rows) if self.held else self.array(slots["values"])
@@ -244,8 +244,8 @@ class Steps(Writer):
         """Set what a change of the values is: that of the stages which follows from it, beside their block.
 
         The size of a block is the largest at the start of the step and, about, at its end. Where every row is
-        a block and the step size fixed, floored sizes are at least how far a row of the group moves, as
-        in `integrators.kernel.step.size.take_sizes`.
+        a block and the step size fixed, floored_change sizes are at least how far a row of the group moves,
+        as in `integrators.kernel.step.size.take_sizes`.
         """
         self.invert_sizes(self.form.groups, lambda d, _: self.extent(d))
 
@@ -309,8 +309,8 @@ class Steps(Writer):
                 for i in range(width):
                     d = self.at(start, 1, i)
                     weight = weight_of(d)
-                    self.put(weight * inverses[0], self.strict, d)
-                    self.put(weight * inverses[1], self.floored, d)
+                    self.put(weight * inverses[0], self.block_weights, d)
+                    self.put(weight * inverses[1], self.floored_weights, d)
 
             self.each(blocks, invert)
 
@@ -480,26 +480,26 @@ class Steps(Writer):
         from integrators.kernel.step.stopping import further, judge, residual_at_end, stagnates
 
         b, form = self.b, self.form
-        change, floored = (self.variable(self.kind, self.zero.value) for _ in range(2))
+        change, floored_change = (self.variable(self.kind, self.zero.value) for _ in range(2))
 
         def largest(d: Index) -> None:
             moved = self.get(self.moved, d)
-            for scales, top in ((self.strict, change), (self.floored, floored)):
+            for scales, top in ((self.block_weights, change), (self.floored_weights, floored_change)):
                 size = (moved * self.get(scales, d)).absolute()
                 b.store(self.load(top).larger(size).value, top)
 
         self.each_row(largest)
-        strict, best, rate = self.load(change), self.load(self.best), self.load(self.rate)
+        largest_change, best, rate = self.load(change), self.load(self.best), self.load(self.rate)
         count = Value(b, splat(b, b.sitofp(tried, DOUBLE), form.lanes))
         best, stalled, rate, converged, residual = judge(
-            strict, self.load(self.last), best, self.load(self.stalled), rate, count, TOLERANCE, 0.0
+            largest_change, self.load(self.last), best, self.load(self.stalled), rate, count, TOLERANCE, 0.0
         )
-        over = converged | stagnates(self.load(floored), stalled)
+        over = converged | stagnates(self.load(floored_change), stalled)
         log_residual = LOG_RESIDUAL_VARYING if form.varying else LOG_RESIDUAL
         more = where(over, further(residual_at_end(converged, residual, best), rate, log_residual), INFINITY)
         left = more.where(undecided, self.load(self.left))
         news = (
-            (self.last, strict),
+            (self.last, largest_change),
             (self.best, best),
             (self.stalled, stalled),
             (self.rate, rate.where(undecided, self.load(self.rate))),
@@ -511,7 +511,7 @@ class Steps(Writer):
         ends = (MOST_IN_LANES,) if form.varying else (MOST_IN_LANES, 2 * MOST_IN_LANES)
         over = [b.icmp_signed("==", tried, ir.Constant(INTEGER, n)) for n in ends]
         all_of_them, none = (ir.Constant(undecided.type, [bit] * form.lanes) for bit in (1, 0))
-        gives_up = b.not_((strict < INFINITY).value)
+        gives_up = b.not_((largest_change < INFINITY).value)
         for flag in over:
             gives_up = b.or_(gives_up, b.select(flag, all_of_them, none))
         failing = b.and_(b.and_(undecided, left.compare(">=", INFINITY)), gives_up)

@@ -5,8 +5,8 @@ from integrators.kernel.implicit.constants import BLENDED, NEWTON
 from integrators.kernel.implicit.corrections import EACH, KEPT, correct, take_stage
 from integrators.kernel.implicit.jacobian import contraction, linearize
 from integrators.kernel.implicit.stages import (
-    FLOORED,
-    STRICT,
+    FLOORED_WEIGHTS,
+    WEIGHTS,
     at,
     changes,
     measure,
@@ -47,7 +47,7 @@ def iterate(ctx, m, which):
     """
     most = MOST_BLENDED if m.method == BLENDED else MOST_CORRECTIONS
     tolerance = ctx.solver.tolerance
-    best, rough, worst = INFINITY, INFINITY, 0.0
+    best, floored_change, worst = INFINITY, INFINITY, 0.0
     rate = m.rate if m.method == NEWTON and which == KEPT else 1.0
     stalled, hopeless = 0, 0
     for tried in range(most + 1):
@@ -56,27 +56,27 @@ def iterate(ctx, m, which):
             if outcome != DONE:
                 return outcome if tried == 1 else DIVERGED
         set_stages(ctx, m)
-        if rough > SIZES_SETTLED:
+        if floored_change > SIZES_SETTLED:
             measure(ctx, m)
         if tried == 0:
             continue
-        strict, before = changes(ctx, m, STRICT), rough
-        rough = changes(ctx, m, FLOORED)
-        m.change = rough
-        if not rough < INFINITY:
+        change, before = changes(ctx, m, WEIGHTS), floored_change
+        floored_change = changes(ctx, m, FLOORED_WEIGHTS)
+        m.change = floored_change
+        if not floored_change < INFINITY:
             return DIVERGED
-        if before < SIZES_SETTLED and rough > STAGNATION:
-            worst = max(worst, rough / before)
-        if strict <= tolerance or strict * max(worst, rate) < FORESEEN * tolerance:
+        if before < SIZES_SETTLED and floored_change > STAGNATION:
+            worst = max(worst, floored_change / before)
+        if change <= tolerance or change * max(worst, rate) < FORESEEN * tolerance:
             break
-        stalled = 0 if strict < best else stalled + 1
-        best = min(best, strict)
+        stalled = 0 if change < best else stalled + 1
+        best = min(best, change)
         if stalled and is_rounding(
-            rough, stalled >= STAGNATION_LIMIT and not rough < STILL_CONVERGING * before
+            floored_change, stalled >= STAGNATION_LIMIT and not floored_change < STILL_CONVERGING * before
         ):
             break
-        hopeless = 0 if rough < before else hopeless + 1
-        if hopeless == STAGNATION_LIMIT and rough < STAGNATION:
+        hopeless = 0 if floored_change < before else hopeless + 1
+        if hopeless == STAGNATION_LIMIT and floored_change < STAGNATION:
             break
         if hopeless == HOPELESS:
             return DIVERGED

@@ -19,7 +19,8 @@ from integrators.kernel.step.size import change, enter_size, forget_sizes, inver
 from integrators.kernel.step.stages import offset
 
 workspace = view(Workspace)
-STRICT, FLOORED = range(2)  # relative to a block, and relative to a block that is raised if it is small
+# Relative to a block, and relative to a block that is raised if it is small
+WEIGHTS, FLOORED_WEIGHTS = range(2)
 
 
 @compiled
@@ -127,17 +128,17 @@ def measure(ctx, m):
         for d in range(ctx.rows):
             drift = abs(ctx.scratch.row_drift[d])
             enter_size(ctx, d, max(drift, abs(m.factor[d] * m.gamma[m.block + 8 * d])))
-        invert_sizes(ctx, m.slope_strict, m.slope_floored)
+        invert_sizes(ctx, m.slope_weights, m.floored_slope_weights)
 
 
 @compiled
 def changes(ctx, m, kind):
     """Return the largest change by the last correction, relative to blocks, small ones raised or not."""
-    result = change(ctx, ctx.blocks.weights if kind == STRICT else ctx.blocks.floored_weights)
+    result = change(ctx, ctx.blocks.weights if kind == WEIGHTS else ctx.blocks.floored_weights)
     if ctx.second:
         top = splat8(result)
         for d in range(ctx.rows):
-            scale = abs(m.factor[d]) * (m.slope_strict[d] if kind == STRICT else m.slope_floored[d])
+            scale = abs(m.factor[d]) * (m.slope_weights[d] if kind == WEIGHTS else m.floored_slope_weights[d])
             for group in range(m.groups):
                 i = m.block + 8 * (m.padded * group + d)
                 top = larger(top, abs(get(m.correction, i)) * scale)

@@ -168,8 +168,8 @@ class Workspace(Memory):
     correction = Array("parts", "block")
     moving = Array("parts", "block", 2)  # coefficients in front of the stage table
     factor = Table("rows")  # h, or h^2 q'/p in the second-order form
-    slope_strict = Table("rows")  # 1 / size of a row's block in h q', second-order form
-    slope_floored = Table("rows")  # small blocks raised
+    slope_weights = Table("rows")  # 1 / size of a row's block in h q', second-order form
+    floored_slope_weights = Table("rows")  # small blocks raised
     predict = Integer()  # 1: the extrapolated start is nearer than the constant one
     change = Real()  # of the last correction
     rate = Real()  # by which corrections have contracted with this Jacobian; 1 where that is not known
