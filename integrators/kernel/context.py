@@ -44,13 +44,13 @@ Integers = NDArray[np.int64]
 # SCATTERED: the iteration has converged, but not to the trajectory. NOT_KEPT: a quantity that a line
 # integral is to keep is no invariant. HALTED: a search for events has to be attended to before the next step.
 # UNSCALED: the step ahead does not become good enough however short it is, and the sizes that the blocks
-# will reach may say that it is. UNSEEN: a partial step sees what the step ahead has not. SLIDING: the field
+# will reach may say that it is. MISSED: a partial step sees what the step ahead has not. SLIDING: the field
 # pushes back to a switching surface from both sides. ACTS: an event in the step changes the state.
 # ACCUMULATE: such events come after ever shorter times. ANEW: one has happened within a step of fixed size,
 # and steps are counted from there. RENEW: one has changed parameters, and what follows from them is not yet
 # renewed.
 RUNNING, DONE, DIVERGED, NOT_FINITE, BUDGET, UNDERFLOW, SCATTERED, NOT_KEPT, HALTED = range(9)
-UNSCALED, UNSEEN, SLIDING, ACTS, ACCUMULATE, ANEW, RENEW = range(9, 16)
+UNSCALED, MISSED, SLIDING, ACTS, ACCUMULATE, ANEW, RENEW = range(9, 16)
 
 # How states between steps are made.
 PARTIAL, STOP, DENSE = range(3)

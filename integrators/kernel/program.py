@@ -77,7 +77,7 @@ SCOUTED = 256
 MOST_EPSILON = 0.2
 """Reversible steps are no longer than this part of the field's time scale, whose density longer ones lose."""
 
-UNSEEN = 1e-12
+LEAST_NEGLIGIBLE = 1e-12
 """Part of a block's size that the error at a discontinuity of the field may always be."""
 
 
@@ -545,7 +545,7 @@ class AdaptiveProgram(HBVMProgram):
         self._estimators = aligned(len(rows) * 8 * -(-k // 8))
         self._estimators.reshape(len(rows), -1)[:, :k] = rows
         # As much as rounding accounts for, and without a bound on the quadrature what the tolerance allows.
-        self._negligible = UNSEEN if quadrature_error is not None else max(tol, UNSEEN)
+        self._negligible = LEAST_NEGLIGIBLE if quadrature_error is not None else max(tol, LEAST_NEGLIGIBLE)
         surfaces = (
             sides(system.function("force" if self.second else "field"))
             if system.traced and not self.kept
@@ -602,8 +602,8 @@ class AdaptiveProgram(HBVMProgram):
         most = math.inf if self.max_step is None else self.max_step
         part = LONGEST * interval if interval > 0.0 else math.inf
         controller = context.controller.numbers
-        controller.longest_blind = min(most, part)
-        controller.longest = controller.longest_blind if self._timed else most
+        controller.longest_constant = min(most, part)
+        controller.longest = controller.longest_constant if self._timed else most
 
     def breakpoints(self, par: Array) -> Array:
         """Return the times that steps end at, ascending: those given, and those of the formulas."""

@@ -138,7 +138,7 @@ class HBVMStepper(ABC):
         "events.time", "events.length_before", "events.acted", "surfaces.reached", "surfaces.on_surface",
         "surfaces.row", "surfaces.length_wanted", "behind.on_surface", "pace.epsilon", "pace.log_density",
         "pace.log_density_behind", "pace.density_slope", "controller.interval", "controller.no_time_scale",
-        "estimate.blind", "estimate.rescaled", "estimate.borrowed", "estimate.asks", "energy.start",
+        "estimate.constant_field", "estimate.rescaled", "estimate.borrowed", "estimate.asks", "energy.start",
         "energy.scale",
     )  # fmt: skip
     _arrays: ClassVar[tuple[str, ...]] = (

@@ -121,10 +121,12 @@ class Control:
                 raise_to(tops[1], slope * speed)
 
             w.each(blocks, measure)
-            top, steep = Value(b, b.load(largest)), Value(b, b.load(steepest))
+            top, largest_slope = Value(b, b.load(largest)), Value(b, b.load(steepest))
             note(doubtful, top < SMALLEST)
 
-            def compare(block: Any, first: int = first, width: int = width, tops: Any = (top, steep)) -> None:
+            def compare(
+                block: Any, first: int = first, width: int = width, tops: Any = (top, largest_slope)
+            ) -> None:
                 start = w.at(block, width, first)
                 scale, slope, gamma_error, gamma_last = (w.get(getattr(w, name), start) for name in MEASURED)
                 mass = w.unity / self.speed(start)

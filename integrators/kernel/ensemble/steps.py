@@ -247,19 +247,19 @@ class Steps(Writer):
         a block and the step size fixed, floored_change sizes are at least how far a row of the group moves,
         as in `integrators.kernel.step.size.take_sizes`.
         """
-        self.invert_sizes(self.form.groups, lambda d, _: self.extent(d))
+        self.invert_sizes(self.form.groups, lambda d, _: self.component_size(d))
 
     def sizes_of_vectors(self) -> None:
         """Set the same of tangent vectors, which are also as large as the newest values move the stages."""
 
         def own(d: Index, weight: Value) -> tuple[Value, Value]:
             last = self.get(self.values, self.at(self.form.k - 1, self.form.rows, d))
-            size, moved = self.extent(d)
+            size, moved = self.component_size(d)
             return size.max((weight * last).absolute()), moved
 
         self.invert_sizes(self.form.vectors, own)
 
-    def extent(self, d: Index) -> tuple[Value, Value]:
+    def component_size(self, d: Index) -> tuple[Value, Value]:
         """Return the size of a component at the start and, about, at the end of a step; and its movement."""
         y = self.get(self.state, d)
         if self.form.second:
@@ -293,8 +293,8 @@ class Steps(Writer):
                 size = self.zero
                 for i in range(width):
                     d = self.at(start, 1, i)
-                    extent, moved = own(d, weight_of(d))
-                    size = size.max(extent)
+                    component_size, moved = own(d, weight_of(d))
+                    size = size.max(component_size)
                     if width == 1 and not form.varying:
                         self.b.store(self.load(tops[1]).max(moved).value, tops[1])
                 self.put(size, self.size, start)

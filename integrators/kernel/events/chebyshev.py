@@ -19,7 +19,7 @@ def transform(search, degree):
     table = doubles(search.transforms[degree // 8])
     for i in range(1, 8):
         values[degree + i] = 0.0
-    damage, search.missing = splat8(0.0), 0.0
+    damage, search.truncation = splat8(0.0), 0.0
     for i in range(0, degree + 8, 8):
         damage += 0.0 * get(values, i)
     if total(damage) != 0.0:
@@ -37,7 +37,7 @@ def transform(search, degree):
         put(coefficients, first + 24, d)
         top = max(max(max(top, abs(a)), abs(b)), max(abs(c), abs(d)))
     tail = max(abs(coefficients[degree - 1]), abs(coefficients[degree]))
-    search.missing = degree * tail
+    search.truncation = degree * tail
     return True, tail > UNRESOLVED * largest(top)
 
 

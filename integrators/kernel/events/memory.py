@@ -104,7 +104,8 @@ class Search(Memory):
     weights = Array(16, "terms")  # of the coefficients of the step's polynomial, at eight times
     values = Array(FINEST + 8)  # samples
     coefficients = Array(FINEST + 32)  # of Chebyshev polynomials
-    missing = Real()  # what the coefficients that follow add up to at a corner, where the j-th is like 1/j^2
+    # What the coefficients that follow add up to at a corner, where the j-th is like 1/j^2
+    truncation = Real()
     n = Integer()  # points where something is known
     points = Array(POINTS)
     fine = Array(POINTS)  # values of the polynomial there, or samples

@@ -18,7 +18,7 @@ from integrators.kernel.events.solve import (
 from integrators.kernel.events.value import noise_at, value_at
 from integrators.kernel.native.jit import compiled
 
-SURE = 10.0  # an extremum this many times the polynomial's error away from zero does not reach it
+CLEAR_OF_ZERO = 10.0  # an extremum this many times the polynomial's error away from zero does not reach it
 BLUR = 1e-7  # of the stretch: how well a minimizer that compares values finds an extremum, with room
 CORNER = 2.5  # times as much at twice the distance: where g is smooth it is 4, at a corner 2
 
@@ -71,7 +71,7 @@ def find_lows(search, first, last):
 
     Near the ends of the stretch its parabola may miss a corner, but not that coefficients are missing.
     """
-    p, end, least, corner = search.fine, search.n - 1, NEAR * search.scale, SURE * search.missing
+    p, end, least, corner = search.fine, search.n - 1, NEAR * search.scale, CLEAR_OF_ZERO * search.truncation
     search.low_count = 0
     if last - first < 2:
         return
@@ -142,10 +142,10 @@ def mark_low(ctx, search, low, way):
     x, p = search.points[low], search.fine[low]
     value = value_at(ctx, search, x)
     # Between these it may fall by as much as it rises, at a corner, which the polynomial also rounds.
-    margin = SURE * search.missing
+    margin = CLEAR_OF_ZERO * search.truncation
     for i in range(max(low - 1, 0), min(low + 2, search.n)):
         margin = max(margin, abs(search.fine[i] - p))
-    margin += SURE * abs(value - p)
+    margin += CLEAR_OF_ZERO * abs(value - p)
     if not is_finite(value) or (sign(value) == way and abs(value) > margin):
         return
     if sign(value) != -way:

@@ -20,7 +20,7 @@ class Controller(Part):
     length_after = Real()  # of the one after the step that is solved
     length_limit = Real()  # no step is longer, for what the iteration allows
     longest = Real()  # no step is longer, for what the user allows and the interval
-    longest_blind = Real()  # the same where the field has the same value at all nodes of a step
+    longest_constant = Real()  # the same where the field has the same value at all nodes of a step
     interval = Real()  # length of all that is integrated, from the trajectory's start; 0: unknown
     stop = Real()  # no step passes this time; infinite: none
     breaks = Integer()  # 1: `stop` is a time at which the field may jump

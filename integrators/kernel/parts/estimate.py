@@ -18,7 +18,7 @@ class Estimate(Part):
     slope = Array("blocks.count")  # the largest coefficient of their field,
     gamma_error = Array("blocks.count")  # gamma_s, which the error is estimated by,
     gamma_last = Array("blocks.count")  # gamma_{k-1}, which the quadrature error is estimated by,
-    abrupt = Array("blocks.count")  # and the largest that does not fall off as a smooth field's do
+    slow_decay = Array("blocks.count")  # and the largest that does not fall off as a smooth field's do
     fastest = Array("blocks.count")  # scale in each group, as a velocity,
     steepest = Array("blocks.count")  # and slope
     least_slope = Real()  # of a block's field beside the largest in its group, where errors are estimated
@@ -30,4 +30,4 @@ class Estimate(Part):
     borrowed = Integer()  # 1: by their own sizes alone the step that was estimated is not good enough
     # 1: what blocks will reach can be asked for, by UNSCALED; -n: after n steps again; 0: never
     asks = Integer()
-    blind = Integer()  # 1: the field has the same value at all nodes of the step that was estimated
+    constant_field = Integer()  # 1: the field has the same value at all nodes of the step that was estimated

@@ -26,7 +26,8 @@ from integrators.kernel.step.fixed_point import evaluate
 from integrators.kernel.step.rule import FIRST_AT_REST, NOTHING, RESTART, SMALLEST
 from integrators.kernel.step.stages import offset
 
-UNSEEN = 1e-13  # part of a block that rounding accounts for in a step that the fixed-point iteration solves
+# Part of a block that rounding accounts for in a step that the fixed-point iteration solves
+ROUNDING_PART = 1e-13
 SLIGHT = 1e-3  # part of the error allowed that a discontinuity counts as where it is negligible
 NARROWEST = 1e-12  # part of the time: shorter steps do not look for a discontinuity any more
 # Times as much is negligible in such a step: next to a zero of a component none might be short enough.
@@ -145,7 +146,7 @@ def compare_ends(ctx):
 
 
 @compiled
-def stays(ctx, d, last):
+def does_not_decay(ctx, d, last):
     """Whether a row's last coefficient is as large, beside those from the middle, as at a discontinuity."""
     middle = greatest(
         size(total(coefficient(ctx, d, MIDDLE))), size(total(coefficient(ctx, d, AFTER_MIDDLE)))
@@ -235,20 +236,20 @@ def local_error(h, gamma, slope, scale):
 @for_both_widths
 def is_visible(h, gamma, scale):
     """Whether a coefficient is more than rounding accounts for."""
-    return h * gamma > UNSEEN * scale
+    return h * gamma > ROUNDING_PART * scale
 
 
 @compiled
-def note_what_stays(ctx):
+def note_slow_decay(ctx):
     """Note for each block the largest last coefficient that is as large as at a discontinuity; 0: none."""
-    abrupt = ctx.estimate.abrupt
+    slow_decay = ctx.estimate.slow_decay
     for d in range(ctx.rows):
         gammas = ctx.estimate.coefficients + 8 * d
         low = lowest(gammas[GAMMA_1], gammas[GAMMA_2], gammas[GAMMA_3])
         high = greatest(gammas[BEFORE_LAST], gammas[LAST])
-        if is_doubtful(low, high, ctx.discontinuities.doubt) and stays(ctx, d, gammas[LAST]):
+        if is_doubtful(low, high, ctx.discontinuities.doubt) and does_not_decay(ctx, d, gammas[LAST]):
             b = ctx.blocks.of_row[d]
-            abrupt[b] = greatest(abrupt[b], high)
+            slow_decay[b] = greatest(slow_decay[b], high)
 
 
 @compiled
@@ -311,9 +312,9 @@ def estimate(ctx):
     if ctx.surfaces.crossed:
         doubtful = True
         for b in range(ctx.blocks.count):
-            ctx.estimate.abrupt[b] = greatest(ctx.estimate.gamma_error[b], ctx.estimate.gamma_last[b])
+            ctx.estimate.slow_decay[b] = greatest(ctx.estimate.gamma_error[b], ctx.estimate.gamma_last[b])
     elif doubtful:
-        note_what_stays(ctx)
+        note_slow_decay(ctx)
     allowed, allowed_quadrature_error, negligible = (
         ctx.controller.allowed_error,
         ctx.controller.allowed_quadrature_error,
@@ -331,9 +332,9 @@ def estimate(ctx):
             gamma_error, gamma_last, high = (
                 ctx.estimate.gamma_error[b],
                 ctx.estimate.gamma_last[b],
-                ctx.estimate.abrupt[b],
+                ctx.estimate.slow_decay[b],
             )
-            if slope > slopes[b] and high <= UNSEEN * steepest:
+            if slope > slopes[b] and high <= ROUNDING_PART * steepest:
                 high = 0.0
             most, most_quadrature_error = INFINITY, INFINITY
             if doubtful and high > 0.0:
@@ -378,7 +379,7 @@ def measure_blocks(ctx):
     )
     group, top, steepest = blocks.group, ctx.estimate.fastest, ctx.estimate.steepest
     for b in range(blocks.count):
-        scale[b] = slopes[b] = gamma_error[b] = gamma_last[b] = ctx.estimate.abrupt[b] = 0.0
+        scale[b] = slopes[b] = gamma_error[b] = gamma_last[b] = ctx.estimate.slow_decay[b] = 0.0
     for g in range(blocks.groups):
         top[g] = steepest[g] = 0.0
     doubtful, changing = False, False
@@ -406,7 +407,7 @@ def measure_blocks(ctx):
         g = group[b]
         top[g] = greatest(top[g], scale[b] * blocks.speed[b])
         steepest[g] = greatest(steepest[g], slopes[b] * blocks.speed[b])
-    ctx.estimate.blind = 0 if changing else 1
+    ctx.estimate.constant_field = 0 if changing else 1
     return doubtful
 
 

@@ -1,6 +1,6 @@
 """Whole trajectories: steps to the times asked for."""
 
-from integrators.kernel.context import BUDGET, DONE, STATE, UNSEEN, UNSOLVED, Context
+from integrators.kernel.context import BUDGET, DONE, MISSED, STATE, UNSOLVED, Context
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.step.act import act, end_at_action, step_or_act
@@ -106,8 +106,8 @@ def advance(ctx, partial, between, count, times, targets, parts, first, out, bud
         shorten_first(ctx)
     for i in range(first, count):
         ctx.samples_written = i
-        outcome = UNSEEN
-        while outcome == UNSEEN:
+        outcome = MISSED
+        while outcome == MISSED:
             if ctx.varying:
                 outcome, budget = approach(ctx, times[i], budget)
                 part = remaining(ctx, times[i])

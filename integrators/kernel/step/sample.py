@@ -1,6 +1,6 @@
 """States between steps, and where a state is in memory."""
 
-from integrators.kernel.context import DENSE, DONE, PART_END, PARTIAL, STATE, STOP, STOPPED, UNSEEN, UNSOLVED
+from integrators.kernel.context import DENSE, DONE, MISSED, PART_END, PARTIAL, STATE, STOP, STOPPED, UNSOLVED
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.memory import call_follow, get, put
 from integrators.kernel.step.advance import solve
@@ -212,11 +212,17 @@ def sample(ctx, partial, between, t, part, out):
         return DONE
     outcome = part_step(ctx, partial, part, 0.0)
     add_counters(ctx, partial)
-    if outcome == DONE and ctx.varying and ctx.estimate.blind and ctx.events.act == 0 and changes(partial):
+    if (
+        outcome == DONE
+        and ctx.varying
+        and ctx.estimate.constant_field
+        and ctx.events.act == 0
+        and changes(partial)
+    ):
         # The step ahead was judged by nodes that see nothing of this: it is solved again, and no longer.
         ctx.solved, ctx.length, ctx.controller.next_length = UNSOLVED, 0.0, part
         ctx.counters.rejections += 1
-        return UNSEEN
+        return MISSED
     if outcome == DONE:
         outcome = followed(ctx, partial, PART_END)
     if outcome == DONE:

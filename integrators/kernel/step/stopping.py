@@ -26,7 +26,7 @@ FASTEST, SLOWEST = -10.0, -1.0
 MOST_EXTRA = 16.0  # evaluations without a test after the last one, at most
 MOST_UNTESTED = 12.0  # iterations in a row without a test before it, at most
 LEAST_RATE, MOST_RATE = log2(1e-4), log2(0.9)
-LOG_RATE_UNSEEN = log2(0.7)  # to the logarithm of the contraction, where the last change was nothing
+LOG_RATE_AT_ZERO = log2(0.7)  # to the logarithm of the contraction, where the last change was nothing
 MOST_TIMES, TRIAL = 3.0, 4.0  # times as many iterations as aimed at are too many, if a trial says so
 
 
@@ -118,9 +118,9 @@ def rate_since(first, change, tries):
 
 
 @for_both_widths
-def rate_unseen(rate):
+def rate_at_zero(rate):
     """Return what the contraction counts as where nothing is left of the change."""
-    return greatest(rate + LOG_RATE_UNSEEN, LEAST_RATE)
+    return greatest(rate + LOG_RATE_AT_ZERO, LEAST_RATE)
 
 
 @for_both_widths

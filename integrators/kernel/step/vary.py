@@ -50,7 +50,7 @@ from integrators.kernel.step.iterate import close, extra_iterations, iterate_to_
 from integrators.kernel.step.reversible import keep_pace
 from integrators.kernel.step.rule import FARTHEST, FIRST_RATE, ROUNDING, SCALE_LASTS, SHORTEST_PART
 from integrators.kernel.step.solver_switch import request_solver, solve_implicitly
-from integrators.kernel.step.stopping import rate_since, rate_unseen, takes_too_long, untested
+from integrators.kernel.step.stopping import rate_at_zero, rate_since, takes_too_long, untested
 from integrators.kernel.step.sums import time_after
 from integrators.kernel.step.surfaces import AGAIN, REACHED, leave, locate, look_across
 
@@ -120,7 +120,7 @@ def iterate(ctx):
             change = binary_log(moved)
             rate = rate_since(first, change, tries)
         elif moved == 0.0 and tries > 1:
-            rate = rate_unseen(rate)
+            rate = rate_at_zero(rate)
         solver.rate = rate
         test(ctx, moved)
         if solver.tried <= tried:  # started anew
@@ -336,8 +336,8 @@ def accepts(ctx, outcome, iterations, implicit):
     controller, surfaces = ctx.controller, ctx.surfaces
     error, quadrature_error = estimate_attempt(ctx, outcome, implicit)
     factor = aim(ctx, error, quadrature_error, MOST_GROWTH if controller.attempts == 0 else 1.0)
-    if outcome == DONE and ctx.estimate.blind and abs(ctx.h) > controller.longest_blind:
-        reject(ctx, outcome, controller.longest_blind / abs(ctx.h), implicit)
+    if outcome == DONE and ctx.estimate.constant_field and abs(ctx.h) > controller.longest_constant:
+        reject(ctx, outcome, controller.longest_constant / abs(ctx.h), implicit)
         return False
     good = is_good(error, controller.allowed_error, quadrature_error, controller.allowed_quadrature_error)
     if surfaces.code and (surfaces.locating or (surfaces.across != NO_SURFACE and not good)):
@@ -417,8 +417,8 @@ def follow(ctx, factor, iterations, implicit):
     elif implicit == 0 and ctx.implicit.strategy != FIXED_POINT:
         count_limited_steps(ctx, factor)
     length = h * (factor if implicit else tabulated_ratio(ctx, factor))
-    if ctx.estimate.blind and abs(length) > controller.longest_blind:
-        length = controller.longest_blind if h > 0.0 else -controller.longest_blind
+    if ctx.estimate.constant_field and abs(length) > controller.longest_constant:
+        length = controller.longest_constant if h > 0.0 else -controller.longest_constant
     controller.length_after = length
 
 
