@@ -325,7 +325,7 @@ class HBVMStepper(ABC):
         there is an implicit solver, ``"implicit"``, a dict: steps that it solved, times
         that it took over, Jacobians (and whether they are "traced" or by "differences"),
         factorizations, corrections, what of the Jacobians and corrections partial steps took,
-        rescues of steps that a fixed Jacobian could not solve. With several
+        ``rescues`` (full Newton iterations of steps that a fixed Jacobian could not solve). With several
         invariants also ``"lost"``, how often one had moved in a step by more than rounding
         accounts for (k is then too small), and ``"left_out"``, the names of those that follow
         from others. With adaptive step size also the method's ``"k"`` and ``"s"`` and, where the field

@@ -34,7 +34,8 @@ HOPELESS = 4  # corrections that do not decrease, or grow, to give up
 OLDEST = 64  # steps for which a Jacobian is used, so that the contraction is known anew
 CONTRACTS_AGAIN = 0.25  # contraction of the fixed-point iteration at which that is to be tried again
 SIZES_SETTLED = 1e-3  # sizes are measured until changes are this small
-LEAST_DECAY = 0.02  # down to this, a step's coefficients must halve from each to the next after a rescue
+# Down to this, a step's coefficients must halve from each to the next after a full Newton iteration
+LEAST_DECAY = 0.02
 
 
 @compiled
@@ -193,7 +194,7 @@ def solve_step(ctx, m, started):
             if use or m.since:
                 trying, use, fresh = 1, 0, True
             elif outcome == DIVERGED and which == KEPT and (m.trajectory == 0 or m.source != 0):
-                m.rescues += 1
+                m.full_newton += 1
                 trying, which, fresh = 1, EACH, False
     m.since += 1
     if which != KEPT:

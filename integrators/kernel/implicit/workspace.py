@@ -204,7 +204,7 @@ class Workspace(Memory):
     corrections = Integer()
     jacobians = Integer()
     factorizations = Integer()
-    rescues = Integer()
+    full_newton = Integer()
 
     def __init__(
         self,
@@ -346,7 +346,7 @@ def report(own: Workspace, part: Workspace) -> dict[str, Any]:
         "jacobian": "traced" if own.traced else "differences",
         "factorizations": own.factorizations + part.factorizations,
         "corrections": own.corrections + part.corrections,
-        "rescues": own.rescues + part.rescues,
+        "rescues": own.full_newton + part.full_newton,
         "partial_jacobians": part.jacobians,
         "partial_corrections": part.corrections,
     }
