@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from integrators.kernel.native.memory import Array, Integer, Memory, Real, Within
-from integrators.kernel.parts.behind import Behind
 from integrators.kernel.parts.blocks import Blocks
 from integrators.kernel.parts.controller import Controller
 from integrators.kernel.parts.counters import Counters
@@ -30,6 +29,7 @@ from integrators.kernel.parts.events import Events
 from integrators.kernel.parts.factors import Factors
 from integrators.kernel.parts.implicit import Implicit
 from integrators.kernel.parts.pace import Pace
+from integrators.kernel.parts.previous import Previous
 from integrators.kernel.parts.scratch import STAGE, Scratch
 from integrators.kernel.parts.solver import Solver
 from integrators.kernel.parts.surfaces import Surfaces
@@ -185,7 +185,7 @@ class Context(Memory):
     controller = Within(Controller)
     estimate = Within(Estimate)
     discontinuities = Within(Discontinuities)
-    behind = Within(Behind)
+    previous = Within(Previous)
     surfaces = Within(Surfaces)
     events = Within(Events)
     energy = Within(Energy)

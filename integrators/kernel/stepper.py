@@ -128,16 +128,16 @@ class HBVMStepper(ABC):
     _words: ClassVar[tuple[str, ...]] = (
         "h", "t0", "n", "length", "older_length", "solved", "blocks.age", "solver.free", "solver.rate",
         "implicit.active", "implicit.slow", "implicit.held", "implicit.left", "time_low",
-        "controller.next_length", "controller.length_after", "controller.length_behind",
-        "controller.error_behind", "controller.error_ahead", "controller.quadrature_error_behind",
+        "controller.next_length", "controller.length_after", "controller.previous_length",
+        "controller.previous_error", "controller.error_ahead", "controller.previous_quadrature_error",
         "controller.quadrature_error_ahead", "controller.length_limit", "discontinuities.count",
         "discontinuities.end",
         "discontinuities.doubt_end",
-        "discontinuities.boundary", "discontinuities.next_boundary", "behind.t0", "behind.time_low",
+        "discontinuities.boundary", "discontinuities.next_boundary", "previous.t0", "previous.time_low",
         "events.seen", "events.acting",
         "events.time", "events.length_before", "events.acted", "surfaces.reached", "surfaces.on_surface",
-        "surfaces.row", "surfaces.length_wanted", "behind.on_surface", "pace.epsilon", "pace.log_density",
-        "pace.log_density_behind", "pace.density_slope", "controller.interval", "controller.no_time_scale",
+        "surfaces.row", "surfaces.length_wanted", "previous.on_surface", "pace.epsilon", "pace.log_density",
+        "pace.previous_log_density", "pace.density_slope", "controller.interval", "controller.no_time_scale",
         "estimate.constant_field", "estimate.rescaled", "estimate.borrowed", "estimate.asks", "energy.start",
         "energy.scale",
     )  # fmt: skip
@@ -145,7 +145,7 @@ class HBVMStepper(ABC):
         "state", "error", "next_state", "next_error", "values", "older_values", "blocks.weights",
         "blocks.floored_weights", "discontinuities.records", "discontinuities.boundary_values",
         "discontinuities.previous_boundary_values", "discontinuities.last_coefficients",
-        "discontinuities.previous_last_coefficients", "behind.state", "behind.error", "estimate.expected",
+        "discontinuities.previous_last_coefficients", "previous.state", "previous.error", "estimate.expected",
     )  # fmt: skip
     error: Exception | None = None
     """What a function of the user raised, where the status is ``USER_ERROR``."""

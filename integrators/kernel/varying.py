@@ -124,7 +124,7 @@ class AdaptiveStepper(HBVMStepper):
         """Whether a breakpoint is reached; as `integrators.kernel.step.vary.remaining`."""
         ctx = self._context
         time_left = (t - self.t) - ctx.time_low
-        return abs(time_left) <= SHORTEST * max(abs(t), abs(self.t), abs(ctx.controller.length_behind))
+        return abs(time_left) <= SHORTEST * max(abs(t), abs(self.t), abs(ctx.controller.previous_length))
 
     def _renew(self, par: Array) -> None:
         super()._renew(par)
@@ -137,7 +137,7 @@ class AdaptiveStepper(HBVMStepper):
         """Begin anew at a breakpoint: what is known from before it says nothing about what follows."""
         ctx = self._context
         ctx.t0, ctx.time_low = t, 0.0
-        ctx.length = ctx.controller.length_behind = 0.0
+        ctx.length = ctx.controller.previous_length = 0.0
         # The step that ended here may have been too short to be followed by one of its length.
         length = ctx.controller.next_length
         ctx.controller.next_length = math.copysign(max(abs(length), RESTART * abs(t)), length)
@@ -164,9 +164,9 @@ class AdaptiveStepper(HBVMStepper):
         if way == 0.0 or not math.copysign(1.0, way) * ctx.controller.next_length < 0.0:
             return
         ctx.controller.next_length *= -1.0
-        if ctx.pace.code:  # the step behind comes again
-            ctx.pace.log_density, ctx.pace.log_density_behind = (
-                ctx.pace.log_density_behind,
+        if ctx.pace.code:  # the previous step comes again
+            ctx.pace.log_density, ctx.pace.previous_log_density = (
+                ctx.pace.previous_log_density,
                 ctx.pace.log_density,
             )
             ctx.pace.epsilon *= -1.0

@@ -57,9 +57,9 @@ def record(event, address, memory_address):
 @compiled
 def show_stages(ctx, stages, count):
     """Copy the stages of a recorded step to behind the rows of the adjoint."""
-    block, behind = ctx.padded * ctx.lanes, ctx.rows * ctx.lanes
-    copy_stages(stages, count, ctx.stages + behind, block, count, ctx.calls)
-    copy_stages(stages, count, ctx.scratch.old_stages + behind, block, count, ctx.calls)
+    block, rows_before = ctx.padded * ctx.lanes, ctx.rows * ctx.lanes
+    copy_stages(stages, count, ctx.stages + rows_before, block, count, ctx.calls)
+    copy_stages(stages, count, ctx.scratch.old_stages + rows_before, block, count, ctx.calls)
 
 
 @compiled

@@ -84,7 +84,10 @@ class Control:
         none = w.zero.compare("!=", 0.0)
         doubtful, visible, changing = (w.variable(w.bits, none) for _ in range(3))
         most_apart = gap_allowed(
-            self.number("negligible"), self.number("outermost"), self.h, self.row("length_behind").absolute()
+            self.number("negligible"),
+            self.number("outermost"),
+            self.h,
+            self.row("previous_length").absolute(),
         )
 
         def raise_to(variable: Any, value: Value) -> None:
@@ -199,9 +202,9 @@ class Control:
         w, slots = self.w, Group.slots
         w.put(end, w.array(slots["next_ends"]), d)
         w.put(last, w.array(slots["next_last_coefficients"]), d)
-        behind, last_behind = (w.get(w.array(slots[name]), d) for name in ("ends", "last_coefficients"))
-        apart = (start - behind).absolute()
-        return where(is_gap(apart, last, last_behind), apart, 0.0)
+        previous, previous_last = (w.get(w.array(slots[name]), d) for name in ("ends", "last_coefficients"))
+        apart = (start - previous).absolute()
+        return where(is_gap(apart, last, previous_last), apart, 0.0)
 
     def aim(self) -> None:
         """Set the `factor` of the next step's length to this one's; see `integrators.kernel.step.control`."""
@@ -223,13 +226,13 @@ class Control:
         self.quadrature_error = log_of_order(self.quadrature_error, self.number("quadrature_error_power"))
         factor = as_errors_allow(
             self.error,
-            self.row("error_behind"),
+            self.row("previous_error"),
             error_aim,
             self.quadrature_error,
-            self.row("quadrature_error_behind"),
+            self.row("previous_quadrature_error"),
             quadrature_error_aim,
             limited,
-            log_ratio(self.h / self.row("length_behind").absolute()),
+            log_ratio(self.h / self.row("previous_length").absolute()),
         )
         self.limit = self.row("length_limit") * APPROACH
         iterations = Value(b, b.load(w.iterations)) - self.row("before")
@@ -273,9 +276,9 @@ class Control:
         )
         w.put(w.unity.where(good, 0.0), w.array(slots["ordinary"]))
         news = {
-            "t0": t, "time_low": low, "error_behind": self.error,
-            "quadrature_error_behind": self.quadrature_error,
-            "length_behind": w.h, "length_limit": self.limit, "h": length, "ratio": self.factor,
+            "t0": t, "time_low": low, "previous_error": self.error,
+            "previous_quadrature_error": self.quadrature_error,
+            "previous_length": w.h, "length_limit": self.limit, "h": length, "ratio": self.factor,
             "begin": w.unity, "before": Value(b, b.load(w.iterations)), "since": since,
         }  # fmt: skip
         for name, value in news.items():

@@ -79,7 +79,7 @@ class Group(Memory):
     doubt = Real()
     negligible = Real()  # part of a block's size that the error at a jump may be; infinite: nobody looks
     outermost = Real()  # the first node
-    # The field at the end of the step behind; see `Discontinuities.boundary_values`
+    # The field at the end of the previous step; see `Discontinuities.boundary_values`
     ends = Array("rows", "lanes")
     last_coefficients = Array("rows", "lanes")  # its last coefficients there
     next_ends = Array("rows", "lanes")
@@ -88,9 +88,9 @@ class Group(Memory):
     longest = Real()  # no step is longer
     target_iterations = Real()  # iterations to aim at, at most
     worth = Real()  # how much longer steps the errors must allow for the implicit solver (logarithm)
-    length_behind = Array("lanes")
-    error_behind = Array("lanes")
-    quadrature_error_behind = Array("lanes")
+    previous_length = Array("lanes")
+    previous_error = Array("lanes")
+    previous_quadrature_error = Array("lanes")
     length_limit = Array("lanes")
     stop = Array("lanes")  # time of the next sample
     unwatched = Array("lanes")  # fewer steps than this may follow one another without a look at the lane

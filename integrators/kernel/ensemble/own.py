@@ -22,7 +22,7 @@ from integrators.kernel.simd.memory import call_steps, put, splat8
 from integrators.kernel.step.anew import reset
 from integrators.kernel.step.begin import INFINITY, can_extrapolate
 from integrators.kernel.step.control import error_power, is_distinct, quadrature_error_power
-from integrators.kernel.step.discontinuities import end_behind, is_near_discontinuity
+from integrators.kernel.step.discontinuities import is_near_discontinuity, previous_end
 from integrators.kernel.step.rule import FIRST_RATE, SMALLEST
 from integrators.kernel.step.size import speed_of
 from integrators.kernel.step.vary import (
@@ -61,7 +61,7 @@ def load(group, lane):
         ctx.values[j] = 0.0
     ctx.t0 = group.start_time
     ctx.controller.stop = ctx.controller.length_limit = INFINITY
-    ctx.controller.next_length, ctx.controller.length_behind = group.first_length, 0.0
+    ctx.controller.next_length, ctx.controller.previous_length = group.first_length, 0.0
     ctx.discontinuities.doubt_end = group.start_time
     ctx.discontinuities.count = ctx.counters.steps = 0
     begin_attempts(ctx)
@@ -94,17 +94,17 @@ def aim(group, lane):
     group.begin[lane] = 0.0 if ctx.controller.rejected else 1.0
     group.before[lane] = group.iterations[lane]
     group.alive[lane] = 1.0
-    group.length_behind[lane], group.length_limit[lane] = (
-        ctx.controller.length_behind,
+    group.previous_length[lane], group.length_limit[lane] = (
+        ctx.controller.previous_length,
         ctx.controller.length_limit,
     )
-    group.error_behind[lane], group.quadrature_error_behind[lane] = (
-        ctx.controller.error_behind,
-        ctx.controller.quadrature_error_behind,
+    group.previous_error[lane], group.previous_quadrature_error[lane] = (
+        ctx.controller.previous_error,
+        ctx.controller.previous_quadrature_error,
     )
     group.stop[lane] = ctx.controller.stop
     suspect = ctx.controller.attempts > 0 or is_near_discontinuity(ctx, h)
-    first = ctx.controller.length_behind == 0.0 or h != ctx.controller.next_length
+    first = ctx.controller.previous_length == 0.0 or h != ctx.controller.next_length
     group.unwatched[lane] = 0.0 if suspect or first else float(STALL_STEPS - ctx.counters.steps % STALL_STEPS)
     group.since[lane] = 0.0
     return 1
@@ -131,10 +131,10 @@ def catch_up(group, lane, ctx):
     controller, discontinuities = ctx.controller, ctx.discontinuities
     ctx.t0, ctx.time_low = group.t0[lane], group.time_low[lane]
     controller.next_length = group.h[lane]
-    ctx.length = controller.length_behind = group.length_behind[lane]
-    controller.error_behind, controller.quadrature_error_behind = (
-        group.error_behind[lane],
-        group.quadrature_error_behind[lane],
+    ctx.length = controller.previous_length = group.previous_length[lane]
+    controller.previous_error, controller.previous_quadrature_error = (
+        group.previous_error[lane],
+        group.previous_quadrature_error[lane],
     )
     controller.length_limit = group.length_limit[lane]
     ctx.counters.steps += int(group.since[lane])
@@ -177,7 +177,7 @@ def step(group, lane, ctx):
     wanted = controller.next_length
     take(ctx)
     if ctx.h != wanted:  # it was to end at a sample: what comes after it need not be as short
-        controller.length_behind = 0.0
+        controller.previous_length = 0.0
         if abs(controller.next_length) < abs(wanted):
             controller.next_length = wanted
     begin_attempts(ctx)
@@ -185,7 +185,7 @@ def step(group, lane, ctx):
         group.state[group.lanes * d + lane] = group.next_state[group.lanes * d + lane]
         group.error[group.lanes * d + lane] = group.next_error[group.lanes * d + lane]
     for d in range(group.rows):
-        group.ends[group.lanes * d + lane] = end_behind(ctx, d)
+        group.ends[group.lanes * d + lane] = previous_end(ctx, d)
         group.last_coefficients[group.lanes * d + lane] = ctx.discontinuities.previous_last_coefficients[d]
     write(group, lane, ctx)
 

@@ -371,14 +371,14 @@ class Steps(Writer):
 
     def predict_from_polynomial(self) -> None:
         """As `predict`, from the powers of the polynomial: this step's length may be another one."""
-        from integrators.kernel.step.begin import behind  # imports numba
+        from integrators.kernel.step.begin import on_previous_step  # imports numba
 
         slots, k, rows = Group.slots, self.form.k, self.form.rows
         ratio, begin = (self.get(self.array(slots[name])) for name in ("ratio", "begin"))
         there = ratio.compare("!=", 0.0)
 
         def stage(i: Index) -> None:
-            x = behind(self.number(self.nodes, i), begin, ratio)
+            x = on_previous_step(self.number(self.nodes, i), begin, ratio)
 
             def row(d: Index) -> None:
                 powers = [self.get(self.ahead, self.at(j, rows, d)) for j in range(k)]

@@ -90,7 +90,7 @@ def watch_ordinary(group, lane):
     ctx = context_at(group.contexts[lane])
     controller, discontinuities = ctx.controller, ctx.discontinuities
     ctx.t0, ctx.time_low = group.start_t0[lane], group.start_time_low[lane]
-    ctx.h = group.length_behind[lane]
+    ctx.h = group.previous_length[lane]
     fetch(group, lane, ctx)
     outcome = look(group, lane, ctx)
     if outcome == DONE:

@@ -65,7 +65,7 @@ def zero_between(ctx, search, a, b):
     low, high, at_low, at_high = a, b, value_at(ctx, search, a), value_at(ctx, search, b)
     otherwise, width = at_high, b - a
     x, slope = guess(search, a, b)
-    behind, at_behind = NAN, NAN
+    previous, at_previous = NAN, NAN
     for i in range(MOST):
         width = high - low
         if width <= search.resolution:
@@ -79,13 +79,13 @@ def zero_between(ctx, search, a, b):
             high, at_high = x, value
         else:
             low, at_low = x, value
-        distance = abs(x - behind)
-        if distance > 0.0 and value != at_behind:
-            slope = (value - at_behind) / (x - behind)
+        distance = abs(x - previous)
+        if distance > 0.0 and value != at_previous:
+            slope = (value - at_previous) / (x - previous)
         following = x - value / slope if slope != 0.0 else NAN
         if distance < SECANT_DISTANCE and abs(following - x) <= search.resolution / 2.0:
             break
-        behind, at_behind = x, value
+        previous, at_previous = x, value
         x = following
         if i > 2 and i % 3 == 2 and high - low > width / 2.0:
             x = low + (high - low) / 2.0

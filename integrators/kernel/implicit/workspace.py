@@ -306,7 +306,7 @@ class Workspace(Memory):
         self.factored = 0
 
     def forget(self) -> None:
-        """Forget the steps behind; the counters of the work done keep counting."""
+        """Forget the previous steps; the counters of the work done keep counting."""
         self.words[_LASTING] = 0
         self.factored = 0
 

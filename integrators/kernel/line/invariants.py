@@ -153,7 +153,7 @@ def measure_gap(ctx):
 
     What is more than rounding was lost by the quadrature (k too small); it is
     counted and stays lost: the invariants are then kept at what they are now. At a start without a
-    past they are what they are. Uses the first stages, which the step behind does not need any more.
+    past they are what they are. Uses the first stages, which the previous step does not need any more.
     """
     remainders, reference, owed, active, terms = (
         ctx.remainders,
@@ -189,7 +189,7 @@ def measure_gap(ctx):
 
 @compiled
 def steepest(ctx, d):
-    """Return the largest of row d's values in the step behind."""
+    """Return the largest of row d's values in the previous step."""
     top = splat8(0.0)
     for chunk in range(ctx.chunks):
         top = larger(top, abs(get(ctx.values, offset(ctx, chunk) + ctx.lanes * d)))

@@ -129,16 +129,16 @@ def _called(system: Foreign, lanes: int) -> tuple[int, Any]:
             states = view(block, stages).reshape(dim, lanes).T.copy()
             given = view(numbers, par).copy() if size else np.empty(0)
             derivatives = np.empty((lanes, dim))
-            behind: tuple[Any, ...] = ()
+            previous: tuple[Any, ...] = ()
             evaluated = owner()
             assert evaluated is not None  # who steps holds its system
             with np.errstate(all="ignore"):
                 for time, state, derivative in zip(times, states, derivatives, strict=True):
-                    if behind and time == behind[0] and (state == behind[1]).all():
-                        derivative[:] = behind[2]  # idle lanes repeat the last stage
+                    if previous and time == previous[0] and (state == previous[1]).all():
+                        derivative[:] = previous[2]  # idle lanes repeat the last stage
                     else:
                         evaluated.evaluate(time, state, given, derivative)
-                    behind = time, state, derivative
+                    previous = time, state, derivative
             out[:] = derivatives.T
         except BaseException as error:  # also Ctrl-C: nothing passes through compiled code
             raised.keep(error)

@@ -11,11 +11,11 @@ class Controller(Part):
     error_degree = Integer()  # of the Legendre coefficient that the error is estimated by
     error_aim = Real()  # logarithm of the error to aim at, divided by its order
     quadrature_error_aim = Real()
-    error_behind = Real()  # logarithm of the last step's estimated error, divided by its order ...
+    previous_error = Real()  # logarithm of the last step's estimated error, divided by its order ...
     error_ahead = Real()  # ... and of that of the step that is solved
-    quadrature_error_behind = Real()  # the same for the quadrature error
+    previous_quadrature_error = Real()  # the same for the quadrature error
     quadrature_error_ahead = Real()
-    length_behind = Real()  # of the last step; 0: unknown
+    previous_length = Real()  # of the last step; 0: unknown
     next_length = Real()  # of the next step to be tried
     length_after = Real()  # of the one after the step that is solved
     length_limit = Real()  # no step is longer, for what the iteration allows

@@ -23,13 +23,13 @@ class Discontinuities(Part):
     # Where the last step would have ended that failed or looked like one with a discontinuity
     doubt_end = Real()
     # The field where steps meet, which no node sees. At the end of the step ahead, as its polynomial says,
-    # eight partial sums a row; the same of the step behind.
+    # eight partial sums a row; the same of the previous step.
     boundary_values = Array(8, "padded")
     previous_boundary_values = Array(8, "padded")
     gaps = Array("rows")  # how far that is from what the polynomial of the step ahead says
     apart = Integer()  # 1: for one of them that is more than for a smooth field
     last_coefficients = Array("rows")  # the larger of the last two coefficients of a row,
-    previous_last_coefficients = Array("rows")  # and in the step behind
-    boundary = Integer()  # what is known of the step behind: START, NOTHING, EXTRAPOLATED, SEEN
+    previous_last_coefficients = Array("rows")  # and in the previous step
+    boundary = Integer()  # what is known of the previous step: START, NOTHING, EXTRAPOLATED, SEEN
     next_boundary = Integer()  # the same of the step ahead
-    undone = Integer()  # 1: the field jumps before the end of the step behind
+    undone = Integer()  # 1: the field jumps before the end of the previous step

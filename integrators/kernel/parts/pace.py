@@ -15,5 +15,5 @@ class Pace(Part):
     times = Array("lanes")
     epsilon = Real()  # negative backwards
     log_density = Real()  # of the step ahead
-    log_density_behind = Real()
+    previous_log_density = Real()
     density_slope = Real()  # of the logarithm, in time, at the state

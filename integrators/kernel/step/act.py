@@ -88,14 +88,14 @@ def end_and_change(ctx):
 
 @compiled
 def act(ctx):
-    """Go on from the state that an event at the end of the step behind makes; the outcome."""
+    """Go on from the state that an event at the end of the previous step makes; the outcome."""
     outcome = change(ctx)
     return go_on(ctx) if outcome == DONE else outcome
 
 
 @compiled
 def change(ctx):
-    """Let the event that has ended the step behind change the state; the outcome."""
+    """Let the event that has ended the previous step change the state; the outcome."""
     events = ctx.events
     ctx.t0, ctx.time_low = events.time, 0.0
     outcome = call_look(events.code, ctx, events.memory)
@@ -109,7 +109,7 @@ def go_on(ctx):
     """Begin at the state that an event has made, and let the search for events begin there; the outcome."""
     controller, events = ctx.controller, ctx.events
     if ctx.varying:
-        controller.next_length, controller.length_behind = length_after_action(ctx), 0.0
+        controller.next_length, controller.previous_length = length_after_action(ctx), 0.0
     events.acted = ctx.t0
     begin_anew(ctx)
     outcome = call_look(events.code, ctx, events.memory)

@@ -127,7 +127,7 @@ def start_extrapolated(ctx):
 
 
 @for_both_widths
-def behind(c, first, ratio):
+def on_previous_step(c, first, ratio):
     """Return where ``first + ratio * c`` of another step is in [-1, 1], on which Legendre polynomials are."""
     return 2.0 * (first + ratio * c) - 1.0
 
@@ -145,7 +145,7 @@ def start_from_polynomial(ctx, source, first, ratio):
     rows, chunks, groups = ctx.rows, ctx.chunks, tables.mode_groups
     nodes, basis, recurrence = tables.nodes, ctx.scratch.basis, tables.recurrence
     for chunk in range(chunks):
-        x = behind(get(nodes, 8 * chunk), first, ratio)
+        x = on_previous_step(get(nodes, 8 * chunk), first, ratio)
         before = splat8(0.0)
         here = splat8(1.0)
         for j in range(tables.modes):

@@ -27,7 +27,7 @@ TINY = 1e-300  # an estimated error of 0 counts as this
 
 
 @for_both_widths
-def log_factor(aim, estimate, behind, change):
+def log_factor(aim, estimate, previous, change):
     """Return the logarithm of the next step's length relative to this one's, from estimated errors.
 
     The length that would have met the tolerance, corrected by how it changed over
@@ -38,15 +38,15 @@ def log_factor(aim, estimate, behind, change):
 
     Parameters
     ----------
-    aim, estimate, behind : float
+    aim, estimate, previous : float
         Logarithms of the tolerance, of the estimated error of this step, and of that of
         the step before (infinite: unknown), each divided by the order of the error.
     change : float
         Logarithm of this step's length relative to that of the step before.
     """
     factor = aim - estimate
-    trend = change + greatest(aim - FORESEEN, behind) - estimate
-    trend = where(behind < INFINITY, where(trend < 0.0, trend, TRUST * trend), 0.0)
+    trend = change + greatest(aim - FORESEEN, previous) - estimate
+    trend = where(previous < INFINITY, where(trend < 0.0, trend, TRUST * trend), 0.0)
     return where(
         factor < 0.0, SHRINK_EXPONENT * factor, greatest(CAUTION * factor, factor - SHORTFALL) + trend
     )
@@ -94,10 +94,10 @@ def log_ratio(x):
 @for_both_widths
 def as_errors_allow(
     error,
-    error_behind,
+    previous_error,
     error_aim,
     quadrature_error,
-    quadrature_error_behind,
+    previous_quadrature_error,
     quadrature_error_aim,
     limited,
     change,
@@ -106,17 +106,19 @@ def as_errors_allow(
 
     Parameters
     ----------
-    error, error_behind, error_aim : float
+    error, previous_error, error_aim : float
         Of this step, of the step before, and to aim at; see `log_factor`.
-    quadrature_error, quadrature_error_behind, quadrature_error_aim : float
+    quadrature_error, previous_quadrature_error, quadrature_error_aim : float
         The same for the quadrature's error,
     limited : bool
         if that is limited too.
     change : float
         Logarithm of this step's length relative to that of the step before.
     """
-    by_error = log_factor(error_aim, error, error_behind, change)
-    by_quadrature_error = log_factor(quadrature_error_aim, quadrature_error, quadrature_error_behind, change)
+    by_error = log_factor(error_aim, error, previous_error, change)
+    by_quadrature_error = log_factor(
+        quadrature_error_aim, quadrature_error, previous_quadrature_error, change
+    )
     return where(limited, least(by_quadrature_error, by_error), by_error)
 
 

@@ -27,7 +27,7 @@ def has_discontinuity(ctx, ends):
     Nodes do not see what is between the first or the last of them and the end of the step. What
     polynomials of two steps say of the field where they meet is compared, if ``ends``. If
     they do not agree, or there has been a discontinuity, or a step may just have been rejected for one, the
-    field is evaluated at both ends. `Discontinuities.undone` says whether the jump is in the step behind.
+    field is evaluated at both ends. `Discontinuities.undone` says whether the jump is in the previous step.
     """
     discontinuities, surfaces = ctx.discontinuities, ctx.surfaces
     discontinuities.next_boundary = NOTHING
@@ -92,23 +92,23 @@ def is_near_discontinuity(ctx, h):
 
 
 @for_both_widths
-def gap_allowed(negligible, outermost, h, length_behind):
+def gap_allowed(negligible, outermost, h, previous_length):
     """Return how far the polynomials of two steps may be apart where they meet, beside the size of a block.
 
     The field is not seen for no longer than the parts of both steps beyond their last and first node,
     ``outermost`` of each.
     """
-    return negligible / (outermost * (h + length_behind))
+    return negligible / (outermost * (h + previous_length))
 
 
 @compiled
 def jumps(ctx):
-    """Whether the step behind and the solved step do not agree about the field where they meet."""
+    """Whether the previous step and the solved step do not agree about the field where they meet."""
     discontinuities = ctx.discontinuities
     if discontinuities.boundary <= NOTHING:
         return False
     most = gap_allowed(
-        discontinuities.negligible, ctx.tables.nodes[0], abs(ctx.h), abs(ctx.controller.length_behind)
+        discontinuities.negligible, ctx.tables.nodes[0], abs(ctx.h), abs(ctx.controller.previous_length)
     )
     for d in range(ctx.rows):
         far = discontinuities.gaps[d]
@@ -121,8 +121,8 @@ def jumps(ctx):
 
 
 @compiled
-def end_behind(ctx, d):
-    """Return what the polynomial of the step behind says of row d of the field at its end."""
+def previous_end(ctx, d):
+    """Return what the polynomial of the previous step says of row d of the field at its end."""
     return total(get(ctx.discontinuities.previous_boundary_values, 8 * d))
 
 
@@ -187,9 +187,9 @@ def finite(far):
 
 @compiled
 def differs_from_previous(ctx, d, value):
-    """Whether the polynomial of the step behind is far from the field's value at its end, in row d."""
-    far = finite(abs(value - end_behind(ctx, d)))
-    least = ctx.discontinuities.negligible / (abs(ctx.controller.length_behind) * ctx.tables.nodes[0])
+    """Whether the polynomial of the previous step is far from the field's value at its end, in row d."""
+    far = finite(abs(value - previous_end(ctx, d)))
+    least = ctx.discontinuities.negligible / (abs(ctx.controller.previous_length) * ctx.tables.nodes[0])
     return far > OUTSIDE * ctx.discontinuities.previous_last_coefficients[d] and far > least * block_size(
         ctx, ctx.blocks.of_row[d]
     )
@@ -215,7 +215,7 @@ def keep_end_of_part(ctx, partial):
 @compiled
 def keep_end(ctx):
     """Keep what is known of the end of the step ahead, and where to go back to, before it is taken."""
-    behind, discontinuities = ctx.behind, ctx.discontinuities
+    previous, discontinuities = ctx.previous, ctx.discontinuities
     discontinuities.boundary_values, discontinuities.previous_boundary_values = (
         discontinuities.previous_boundary_values,
         discontinuities.boundary_values,
@@ -225,22 +225,22 @@ def keep_end(ctx):
         discontinuities.last_coefficients,
     )
     discontinuities.boundary, discontinuities.next_boundary = discontinuities.next_boundary, NOTHING
-    behind.t0, behind.time_low = ctx.t0, ctx.time_low
-    behind.on_surface = ctx.surfaces.on_surface
+    previous.t0, previous.time_low = ctx.t0, ctx.time_low
+    previous.on_surface = ctx.surfaces.on_surface
 
 
 @compiled
 def undo(ctx):
-    """Go back to before the step behind, for a shorter one; record the place of a discontinuity in that."""
-    controller, behind = ctx.controller, ctx.behind
-    h = controller.length_behind
-    ctx.state, behind.state = behind.state, ctx.state
-    ctx.error, behind.error = behind.error, ctx.error
-    ctx.t0, ctx.time_low, ctx.n = behind.t0, behind.time_low, 0
+    """Go back to before the previous step, for a shorter one; record the place of a discontinuity in that."""
+    controller, previous = ctx.controller, ctx.previous
+    h = controller.previous_length
+    ctx.state, previous.state = previous.state, ctx.state
+    ctx.error, previous.error = previous.error, ctx.error
+    ctx.t0, ctx.time_low, ctx.n = previous.t0, previous.time_low, 0
     controller.next_length = RETREAT * h
-    controller.length_behind = 0.0
+    controller.previous_length = 0.0
     ctx.discontinuities.boundary = NOTHING
-    ctx.surfaces.on_surface, ctx.surfaces.row = AT_ORIGIN if behind.on_surface else 0, 0
+    ctx.surfaces.on_surface, ctx.surfaces.row = AT_ORIGIN if previous.on_surface else 0, 0
     ctx.discontinuities.undone = 0
     ctx.counters.steps -= 1
     forget(ctx)
@@ -271,7 +271,7 @@ def is_smooth_to_end(ctx):
 
 @compiled
 def confirm_previous_step(ctx):
-    """Whether the field does not jump before the end of the step behind; else undo that."""
+    """Whether the field does not jump before the end of the previous step; else undo that."""
     controller = ctx.controller
     if ctx.discontinuities.boundary != EXTRAPOLATED:
         return True

@@ -101,26 +101,26 @@ def take_coefficients_of_two(ctx):
 
 
 @for_both_widths
-def is_gap(apart, last, last_behind):
+def is_gap(apart, last, previous_last):
     """Whether the polynomials of two steps are farther apart where they meet than for a smooth field.
 
     Parameters
     ----------
     apart : float
-    last, last_behind : float
+    last, previous_last : float
         The last coefficients of the steps.
     """
-    return apart > OUTSIDE * (last + last_behind)
+    return apart > OUTSIDE * (last + previous_last)
 
 
 @compiled
 def compare_ends(ctx):
-    """Compare the field at the start of the solved step with that at the end of the step behind.
+    """Compare the field at the start of the solved step with that at the end of the previous step.
 
     As their polynomials say. It is done last, since the length of the next step has not to wait for it.
     """
     discontinuities = ctx.discontinuities
-    gammas, boundary_values, behind, gaps = (
+    gammas, boundary_values, previous, gaps = (
         ctx.estimate.coefficients,
         discontinuities.boundary_values,
         discontinuities.previous_boundary_values,
@@ -139,7 +139,7 @@ def compare_ends(ctx):
         else:
             start, end = coefficient(ctx, d, AT_START), coefficient(ctx, d, AT_END)
         put(boundary_values, 8 * d, end)
-        gaps[d] = far = abs(total(start - get(behind, 8 * d)))
+        gaps[d] = far = abs(total(start - get(previous, 8 * d)))
         last_coefficients[d] = last = greatest(gammas[8 * d + BEFORE_LAST], gammas[8 * d + LAST])
         apart |= is_gap(far, last, previous_last_coefficients[d])
     discontinuities.apart = 1 if apart else 0

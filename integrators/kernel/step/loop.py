@@ -44,7 +44,7 @@ def approach(ctx, t, budget):
         outcome = ready(ctx)
         if outcome != DONE:
             return outcome, budget
-        if ctx.t0 != begin:  # the step behind was undone
+        if ctx.t0 != begin:  # the previous step was undone
             time_left = remaining(ctx, t)
         time_left, h = abs(time_left), abs(ctx.h)
         inside = time_left < h - TIME_TOLERANCE * abs(t)

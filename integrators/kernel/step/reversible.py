@@ -48,10 +48,10 @@ def growth(c):
 
 
 @compiled
-def set_pace(ctx, behind, ahead):
-    """Set the logarithms of the densities of the step behind and of that ahead, and its length."""
+def set_pace(ctx, previous, ahead):
+    """Set the logarithms of the densities of the previous step and of that ahead, and its length."""
     pace = ctx.pace
-    pace.log_density_behind, pace.log_density = behind, ahead
+    pace.previous_log_density, pace.log_density = previous, ahead
     ctx.controller.next_length = pace.epsilon * exp(-ahead)
 
 
@@ -69,5 +69,5 @@ def keep_pace(ctx):
     """Set the density of the next step after one is taken, and its length."""
     pace = ctx.pace
     find_slope(ctx)
-    behind = pace.log_density
-    set_pace(ctx, behind, behind + growth(2.0 * pace.epsilon * pace.density_slope * exp(-behind)))
+    previous = pace.log_density
+    set_pace(ctx, previous, previous + growth(2.0 * pace.epsilon * pace.density_slope * exp(-previous)))

@@ -107,7 +107,7 @@ def part_step(ctx, partial, part, known):
     """Solve in ``partial`` a step of length ``part`` from the state of ``ctx``; leaves ``ctx`` as it is.
 
     First stages come from the partial step of length ``known`` that ``partial`` has made from there; if that
-    is 0, from inside the step ahead if that is solved, else from the step behind.
+    is 0, from inside the step ahead if that is solved, else from the previous step.
     """
     set_step(partial, part)
     copy(ctx.state, partial.state, vectors_of_state(ctx))
@@ -175,7 +175,7 @@ def stop_at(ctx, partial, t):
     ctx.surfaces.on_surface = 0
     if ctx.varying:
         keep_end_of_part(ctx, partial)
-        ctx.controller.length_behind = partial.h
+        ctx.controller.previous_length = partial.h
     set_time(ctx, t)
     ctx.solved = UNSOLVED
     arrive(ctx)

@@ -12,7 +12,7 @@ from integrators.kernel.parts.surfaces import AT_ORIGIN, END_ACROSS, MOST_SIDES,
 from integrators.kernel.simd.memory import call_field
 from integrators.kernel.step.begin import INFINITY
 from integrators.kernel.step.control import is_distinct
-from integrators.kernel.step.discontinuities import end_behind
+from integrators.kernel.step.discontinuities import previous_end
 from integrators.kernel.step.sample import interpolate
 
 # What comes of a step that crosses a surface, or was to end on one: judged like all others; tried again with
@@ -269,7 +269,7 @@ def leave(ctx):
             call_field(ctx.field, surfaces.times, scratch.sums, ctx.par, values)
             ctx.counters.evaluations += 1
         for d in range(rows):
-            slope = values[lanes * d] if surfaces.on_surface == AT_ORIGIN else end_behind(ctx, d)
+            slope = values[lanes * d] if surfaces.on_surface == AT_ORIGIN else previous_end(ctx, d)
             for lane in range(lanes):
                 scratch.sums[lanes * d + lane] += move * slope
     call_field(ctx.field, surfaces.times, scratch.sums, ctx.par, values)

@@ -140,20 +140,20 @@ def aim(ctx, error, quadrature_error, most_growth):
     controller = ctx.controller
     if not error < INFINITY:
         return SHRINK
-    h, behind = ctx.h, controller.length_behind
-    known = behind != 0.0
+    h, previous = ctx.h, controller.previous_length
+    known = previous != 0.0
     error = log_of_order(error, error_power(controller.error_degree))
     quadrature_error = log_of_order(quadrature_error, quadrature_error_power(ctx.k))
     controller.error_ahead, controller.quadrature_error_ahead = error, quadrature_error
     factor = as_errors_allow(
         error,
-        controller.error_behind if known else INFINITY,
+        controller.previous_error if known else INFINITY,
         controller.error_aim,
         quadrature_error,
-        controller.quadrature_error_behind if known else INFINITY,
+        controller.previous_quadrature_error if known else INFINITY,
         controller.quadrature_error_aim,
         controller.allowed_quadrature_error < INFINITY,
-        log_ratio(h / behind) if known else 0.0,
+        log_ratio(h / previous) if known else 0.0,
     )
     return bounded(factor, most_growth)
 
@@ -213,13 +213,13 @@ def set_wait(ctx):
 def remaining(ctx, t):
     """Return how far the time t is ahead; 0 where it is the present but for rounding, or behind.
 
-    Rounding is that of the times and of the step behind, which may be all there is at t = 0. A
+    Rounding is that of the times and of the previous step, which may be all there is at t = 0. A
     breakpoint counts as reached when it is so near that no step there could be told from none.
     """
     controller = ctx.controller
     t0 = ctx.t0
     time_left = (t - t0) - ctx.time_low
-    size = max(max(abs(t), abs(t0)), abs(controller.length_behind))
+    size = max(max(abs(t), abs(t0)), abs(controller.previous_length))
     close = SHORTEST if t == controller.stop else TIME_TOLERANCE
     return 0.0 if abs(time_left) <= close * size or time_left * controller.next_length < 0.0 else time_left
 
@@ -467,11 +467,11 @@ def reject(ctx, outcome, factor, implicit):
 @compiled
 def take(ctx):
     """Take the step ahead, which is solved."""
-    controller, behind = ctx.controller, ctx.behind
+    controller, previous = ctx.controller, ctx.previous
     t, low = time_after(ctx.t0, ctx.time_low, ctx.h)
     keep_end(ctx)
-    behind.state, ctx.state, ctx.next_state = ctx.state, ctx.next_state, behind.state
-    behind.error, ctx.error, ctx.next_error = ctx.error, ctx.next_error, behind.error
+    previous.state, ctx.state, ctx.next_state = ctx.state, ctx.next_state, previous.state
+    previous.error, ctx.error, ctx.next_error = ctx.error, ctx.next_error, previous.error
     count_step(ctx)
     ctx.n = controller.no_time_scale = 0
     if ctx.estimate.asks < 0:
@@ -479,9 +479,9 @@ def take(ctx):
     ctx.t0 = t
     ctx.time_low = low
     controller.next_length = controller.length_after
-    controller.length_behind = ctx.h
-    controller.error_behind = controller.error_ahead
-    controller.quadrature_error_behind = controller.quadrature_error_ahead
+    controller.previous_length = ctx.h
+    controller.previous_error = controller.error_ahead
+    controller.previous_quadrature_error = controller.quadrature_error_ahead
     if ctx.pace.code:
         keep_pace(ctx)
     if ctx.surfaces.code:
@@ -490,10 +490,10 @@ def take(ctx):
 
 @compiled
 def arrive_on_surface(ctx):
-    """Begin anew where the step behind has ended on a switching surface."""
+    """Begin anew where the previous step has ended on a switching surface."""
     surfaces = ctx.surfaces
     surfaces.on_surface = AT_STEP_END if surfaces.reached else 0
     if surfaces.reached:
         surfaces.reached = 0
-        ctx.length = ctx.controller.length_behind = 0.0
+        ctx.length = ctx.controller.previous_length = 0.0
         ctx.discontinuities.boundary = START

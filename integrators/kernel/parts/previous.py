@@ -3,8 +3,8 @@
 from integrators.kernel.native.memory import Array, Integer, Part, Real
 
 
-class Behind(Part):
-    """The state before the step behind, to go back to; see `step.discontinuities.undo`."""
+class Previous(Part):
+    """The state before the previous step, to go back to; see `step.discontinuities.undo`."""
 
     state = Array(2, "padded")
     error = Array(2, "padded")
