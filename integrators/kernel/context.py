@@ -135,10 +135,10 @@ class Context(Memory):
     # --- what is integrated, and how ---
     field = Integer()  # address of void(times, stages, par, values) on one block of stages
     fused = Integer()  # address of whole iterations, void(context, count, after); 0: none, see `step.fused`
-    # address of a line integral, int64(what, context); 0: plain. It makes the VALUES at the stages from the
-    # field, the state at a step's END, and learns of every new state at which the trajectory has ARRIVEd.
+    # address of a line integral, int64(operation, context); 0: plain. It makes the VALUES at the stages from
+    # the field, the state at a step's END, and learns of every new state at which the trajectory has ARRIVEd.
     line = Integer()
-    # address of int64(what, context, memory), which vectors follow the steps by; 0: none
+    # address of int64(operation, context, memory), which vectors follow the steps by; 0: none
     follow = Integer()
     follow_memory = Integer()
     parameters = Integer()

@@ -41,8 +41,8 @@ class FixedStepper(HBVMStepper):
         self._begin(start, t0)
         self._status, self._reason, self.error = Status.RUNNING, "", None
         times = np.array([t])
-        states, outcome, why = self._fill(STOP, times, np.zeros(1, dtype=np.int64), times - t0)
-        return self._samples(times[: len(states)], states, outcome, why)
+        states, outcome, reason = self._fill(STOP, times, np.zeros(1, dtype=np.int64), times - t0)
+        return self._samples(times[: len(states)], states, outcome, reason)
 
     def _one_step(self) -> bool:
         numbers, call, _ = self._for_one_step
@@ -77,7 +77,7 @@ class FixedStepper(HBVMStepper):
 
     def _to(self, grid: Array, between: int) -> Samples:
         """Make the samples at some times; steps are counted from each event that changes the state."""
-        ctx, pieces, done, outcome, why = self._context, [], 0, ANEW, None
+        ctx, pieces, done, outcome, reason = self._context, [], 0, ANEW, None
         size, late = self._first_piece, perf_counter() + self.time_limit
         while outcome == ANEW or (outcome == DONE and done < grid.size):
             if done and perf_counter() > late:
@@ -87,12 +87,12 @@ class FixedStepper(HBVMStepper):
             bases = np.full(piece.size, ctx.t0)
             if between == STOP:
                 bases[1:] = piece[:-1]
-            states, outcome, why = self._fill(between, piece, *plan(piece, bases, ctx.h))
+            states, outcome, reason = self._fill(between, piece, *plan(piece, bases, ctx.h))
             pieces.append(states)
             done += len(states)
             size = FEW if outcome == ANEW else GROWTH * size
         states = pieces[0] if len(pieces) == 1 else np.concatenate(pieces)
-        return self._samples(grid[:done], states, outcome, why)
+        return self._samples(grid[:done], states, outcome, reason)
 
     def _steps(self, first: int, end: float | None, most: int = MOST) -> Samples:
         """Take steps from number ``first`` on, ``most`` at most and none beyond ``end``; return them.
@@ -100,7 +100,7 @@ class FixedStepper(HBVMStepper):
         An event that changes the state ends a step; the next has the number 1.
         """
         ctx, times, states = self._context, [], []
-        size, outcome, why, over = self._first_piece, DONE, None, False
+        size, outcome, reason, over = self._first_piece, DONE, None, False
         while not over:
             final, last_part = first + most - 1, 0.0
             if end is not None:
@@ -115,9 +115,9 @@ class FixedStepper(HBVMStepper):
                 # What is left of the time is looked at for events that change the state; the sample is none.
                 between, at = DENSE, np.append(t, end)
                 targets, parts = np.append(targets, last), np.append(parts, last_part)
-            made, outcome, why = self._fill(between, at, targets, parts)
-            times.append(t[: len(made)])
-            states.append(made[: t.size])
+            new, outcome, reason = self._fill(between, at, targets, parts)
+            times.append(t[: len(new)])
+            states.append(new[: t.size])
             most -= len(states[-1])
             if outcome == ANEW:
                 times.append(np.array([ctx.t0]))
@@ -126,8 +126,8 @@ class FixedStepper(HBVMStepper):
             else:
                 first, size, over = last + 1, GROWTH * size, outcome != DONE or last == final
         if len(times) == 1:
-            return self._samples(times[0], states[0], outcome, why)
-        return self._samples(np.concatenate(times), np.concatenate(states), outcome, why)
+            return self._samples(times[0], states[0], outcome, reason)
+        return self._samples(np.concatenate(times), np.concatenate(states), outcome, reason)
 
     @property
     def _first_piece(self) -> int:

@@ -55,7 +55,7 @@ SHORTEST_TIME = 64  # units in the last place: nothing happens in a time as shor
 FIRST_HELD = 16  # steps for which the implicit solver stays at work when it is made; `solve` has more
 
 Ended = tuple[Status, str]  # how a run is over before its end, and the reason as a sentence
-Made = tuple[Array, int, Ended | None]  # samples, how the kernel came back, and why they are the last
+Filled = tuple[Array, int, Ended | None]  # samples, how the kernel came back, and why they are the last
 
 
 class Program(Protocol):
@@ -535,24 +535,24 @@ class HBVMStepper(ABC):
     def _identity(self) -> Identity:
         return Identity.from_system(self._program.description, self._program.system, self._par)
 
-    def _fill(self, between: int, times: Array, *steps_and_parts: NDArray[Any]) -> Made:
+    def _fill(self, between: int, times: Array, *steps_and_parts: NDArray[Any]) -> Filled:
         """Make samples, in chunks so that Ctrl-C is heard between them."""
         times, given = np.ascontiguousarray(times), tuple(map(np.ascontiguousarray, steps_and_parts))
         addresses = tuple(map(address, given))
         out = np.empty((times.size, self._dim))
         if self._vectors:
             self._vectors.room(times.size)
-        outcome, count, why, ctx = BUDGET, 0, None, self._context
+        outcome, count, reason, ctx = BUDGET, 0, None, self._context
         late = perf_counter() + self.time_limit
-        while outcome == BUDGET and why is None and not (count and perf_counter() > late):
+        while outcome == BUDGET and reason is None and not (count and perf_counter() > late):
             before = ctx.counters.steps
             outcome = self._call(engine.ADVANCE, between, times, out, count, self._budget(), *addresses)
             count = ctx.samples_written
             if outcome == BUDGET:
-                why = self._ended(ctx.counters.steps - before)
+                reason = self._ended(ctx.counters.steps - before)
         if self._vectors:
             self._vectors.note(times[:count])
-        return out[:count], outcome, why
+        return out[:count], outcome, reason
 
     def _budget(self) -> int:
         """Return how many steps the kernel may take at a time."""
@@ -610,14 +610,14 @@ class HBVMStepper(ABC):
         """Whether the kernel has come back for the implicit solver."""
         return self._context.implicit.wanted != NOT_WANTED
 
-    def _samples(self, t: Array, y: Array, outcome: int, why: "Ended | None" = None) -> Samples:
-        if why is None and outcome not in (DONE, BUDGET):
-            why = self._failure(outcome)
-        if why is not None:
-            self._status, self._reason = why
+    def _samples(self, t: Array, y: Array, outcome: int, reason: "Ended | None" = None) -> Samples:
+        if reason is None and outcome not in (DONE, BUDGET):
+            reason = self._failure(outcome)
+        if reason is not None:
+            self._status, self._reason = reason
         if self._vectors:
             self.variations = self._vectors.take(t)
-        return Samples(t, y, Status.FINISHED if why is None else why[0], self._reason)
+        return Samples(t, y, Status.FINISHED if reason is None else reason[0], self._reason)
 
     def _failure(self, outcome: int) -> tuple[Status, str]:
         """Return the status that an outcome stands for, and the reason as a sentence."""

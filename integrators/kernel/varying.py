@@ -178,24 +178,24 @@ class AdaptiveStepper(HBVMStepper):
         """Make the samples, piece by piece from one breakpoint to the next."""
         self._watch = stall_detector(self, self.t, float(times[-1]))
         if not self._breakpoints.size and not self._context.events.act:
-            states, outcome, why = self._fill(between, times)
-            return self._samples(times[: len(states)], states, outcome, why)
+            states, outcome, reason = self._fill(between, times)
+            return self._samples(times[: len(states)], states, outcome, reason)
         out = np.empty((times.size, self._dim))
-        count, outcome, why = 0, ANEW, None
-        while count < times.size and outcome in (DONE, ANEW) and why is None:
+        count, outcome, reason = 0, ANEW, None
+        while count < times.size and outcome in (DONE, ANEW) and reason is None:
             stop = self._stop()
             beyond = np.flatnonzero((times - stop) * self._context.controller.next_length > 0.0)
             last = int(beyond[0]) if beyond.size and beyond[0] >= count else times.size
             piece = times[count:last]
             meets = last < times.size or times[-1] == stop
             grid = np.append(piece, stop) if meets and (not piece.size or piece[-1] != stop) else piece
-            states, outcome, why = self._fill(between, grid)
+            states, outcome, reason = self._fill(between, grid)
             n = min(len(states), piece.size)
             out[count : count + n] = states[:n]
             count += n
-            if meets and outcome == DONE and why is None:
+            if meets and outcome == DONE and reason is None:
                 self._restart(stop)
-        return self._samples(times[:count], out[:count], outcome, why)
+        return self._samples(times[:count], out[:count], outcome, reason)
 
     def _handled(self, outcome: int) -> int:
         breakpoints = self._breakpoints
@@ -321,8 +321,8 @@ class AdaptiveStepper(HBVMStepper):
             return Status.MAX_STEPS, (
                 f"max_steps={most} steps came to t = {self.t!r} only; give more, or a looser tol."
             )
-        why = self._watch.update(self.t, steps, float(np.abs(self.y).max()))
-        return (Status.STALLED, why) if why else None
+        reason = self._watch.update(self.t, steps, float(np.abs(self.y).max()))
+        return (Status.STALLED, reason) if reason else None
 
     @one_thread
     def take_steps(
@@ -345,9 +345,9 @@ class AdaptiveStepper(HBVMStepper):
         if present and self._vectors:
             self._vectors.note_now(self.t)
         self._face(end)
-        outcome, steps, why, ctx = BUDGET, 0, None, self._context
+        outcome, steps, reason, ctx = BUDGET, 0, None, self._context
         self._watch = stall_detector(self, self.t, end)
-        while outcome == BUDGET and (limit is None or steps < limit) and why is None:
+        while outcome == BUDGET and (limit is None or steps < limit) and reason is None:
             # fewer come where the implicit solver is made
             n = self._budget(None if limit is None else limit - steps)
             if longest < math.inf:
@@ -369,11 +369,11 @@ class AdaptiveStepper(HBVMStepper):
                 times[count - 1 : count] = stop
                 self._restart(stop)
             elif outcome == BUDGET and (n == 0 or (limit is None and self._budget(1))):
-                why = self._ended(count)
+                reason = self._ended(count)
             if self._vectors:
                 self._vectors.note(times[:count])
         t, y = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
-        return self._samples(t, y, DONE if outcome == BUDGET else outcome, why)
+        return self._samples(t, y, DONE if outcome == BUDGET else outcome, reason)
 
     def _failure(self, outcome: int) -> tuple[Status, str]:
         """Return the status that an outcome stands for, and the reason as a sentence."""

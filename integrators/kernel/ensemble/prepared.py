@@ -27,7 +27,7 @@ UNROLLED = 640  # products of an iteration that are written out, at most
 FEW_ROWS, FEW_CALLS = 4, 3  # where both are exceeded, no products are written out
 ROOM = 4096  # rows of all stages, at most: beyond, a group of trajectories does not fit in the nearest caches
 
-Made = TypeVar("Made")
+Result = TypeVar("Result")
 
 
 class Lanes:
@@ -203,7 +203,7 @@ def lanes_of(
     return compiled_lanes(lambda: Lanes(system, constants, second, unit, varying))
 
 
-def compiled_lanes(make: Callable[[], Made]) -> tuple[Made | None, float]:
+def compiled_lanes(make: Callable[[], Result]) -> tuple[Result | None, float]:
     """Return what a function compiles, or ``None`` where numba cannot; and the seconds that took."""
     started = binary.clock()
     lanes_ = None

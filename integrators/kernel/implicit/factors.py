@@ -42,7 +42,7 @@ class Factors:
     Attributes
     ----------
     address : int
-        Of the C function ``int64(what, group)`` that works on it.
+        Of the C function ``int64(operation, group)`` that works on it.
     error : BaseException or None
         What went wrong last in a call, which compiled code takes for a failure.
     """

@@ -119,7 +119,7 @@ class Workspace(Memory):
 
     method = Integer()  # how corrections are computed: NEWTON, BLENDED
     source = Integer()  # address of the Jacobian, void(t, y, par, entries); 0 for differences
-    factors = Integer()  # address of what keeps the factors, int64(what, pair); 0: they are here
+    factors = Integer()  # address of what keeps the factors, int64(operation, pair); 0: they are here
     rows = Integer()
     copies = Integer()
     unknowns = Integer()  # rows of a copy

@@ -16,7 +16,7 @@ class LineContext(Context):
 
     mode = Integer()  # INVARIANTS, POISSON
     invariants = Integer()  # how many
-    every = Integer()  # rows of `found`
+    every = Integer()  # rows that it writes
     measure = Integer()  # address of what writes the gradients and then the invariants themselves
     gradients = Array("calls", "every", "lanes")  # in the layout of stage memory
     remainders = Array("calls", "every", "lanes")  # what their first s coefficients leave of the rows

@@ -33,7 +33,7 @@ def _kind(slot: Any) -> Any:
         return types.int64
     if isinstance(slot, Real):
         return types.float64
-    return DOUBLES if slot.of is float else INTEGERS
+    return DOUBLES if slot.dtype is float else INTEGERS
 
 
 def _kind_of(memory: Any, name: str) -> Any:

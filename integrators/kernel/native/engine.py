@@ -12,7 +12,7 @@ from integrators.kernel.native.raised import Interrupts, calls_back, raise_kept
 
 # What the entry of `step` can do; see `integrators.kernel.step.entry`.
 RESET, ADVANCE, TAKE, PART, GO_ON, ACT = range(6)
-ENTRY = "what ctx partial between count times targets parts first out budget"
+ENTRY = "operation ctx partial between count times targets parts first out budget"
 
 WAIT = "integrators: compiling the kernel for this processor, once: 2 to 10 s (ahead: `hbvm-bench warm`)"
 

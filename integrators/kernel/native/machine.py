@@ -14,7 +14,7 @@ import llvmlite.binding as llvm
 
 ENTRY = "hbvm_entry"
 
-Made = TypeVar("Made", bytes, str)
+Result = TypeVar("Result", bytes, str)
 
 lock = threading.RLock()
 """Held while code is compiled or loaded, and during a fork, which waits for that: LLVM's and numba's own
@@ -46,7 +46,7 @@ def entered(
     return module
 
 
-def optimized(module: Any, emit: Callable[[Any, Any], Made]) -> Made:
+def optimized(module: Any, emit: Callable[[Any, Any], Result]) -> Result:
     """Return what is emitted of a module that is optimized for this processor."""
     machine = _machine()
     options = llvm.create_pipeline_tuning_options(speed_level=3)

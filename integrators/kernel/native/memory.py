@@ -136,7 +136,7 @@ class Array(Slot):
     """
 
     def __init__(self, *shape: int | str, kind: type = float):
-        self.shape, self.of = shape, kind
+        self.shape, self.dtype = shape, kind
 
     @overload
     def __get__(self, memory: None, owner: type) -> Self: ...
@@ -150,7 +150,7 @@ class Array(Slot):
         # Compiled code may have exchanged it for another.
         start = memory._first + (int(memory.words[self.index]) - memory.address) // 8
         words = memory._memory[start : memory._ends[start]]
-        return words if self.of is float else words.view(np.int64)
+        return words if self.dtype is float else words.view(np.int64)
 
 
 class Table(Array):

@@ -38,7 +38,7 @@ class Numbers(types.Type):
     """Memory with a number every ``stride`` words: ``view[i]`` is a double, or an integer."""
 
     def __init__(self, stride: int = 1, kind: Any = types.float64):
-        self.stride, self.of = stride, kind
+        self.stride, self.dtype = stride, kind
         super().__init__(name=f"Numbers({stride}, {kind})")
 
 
@@ -59,7 +59,7 @@ class _NumbersModel(models.PrimitiveModel):
 
 
 def _item(view: Any) -> Any:
-    return DOUBLE if view.of == types.float64 else INTEGER
+    return DOUBLE if view.dtype == types.float64 else INTEGER
 
 
 def _aligned(stride: int) -> int:
@@ -80,7 +80,7 @@ def _type_get(context):
             return None
         if isinstance(view, Rows):
             return Lanes(view.count)(view, types.intp)
-        return view.of(view, types.intp) if isinstance(view, Numbers) else None
+        return view.dtype(view, types.intp) if isinstance(view, Numbers) else None
 
     return typed
 
@@ -93,7 +93,7 @@ def _type_set(context):
         if isinstance(view, Rows) and isinstance(value, Lanes | types.Number):
             return types.none(view, types.intp, *arguments_for([value]))
         if isinstance(view, Numbers) and isinstance(value, types.Number):
-            return types.none(view, types.intp, view.of)
+            return types.none(view, types.intp, view.dtype)
         return None
 
     return typed

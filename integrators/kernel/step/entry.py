@@ -12,7 +12,7 @@ from integrators.kernel.step.sample import part_step, write
 
 @compiled
 def entry(operation, ctx, partial, between, count, times, targets, parts, first, out, budget):
-    """Do what ``what`` names; all arguments are integers or addresses.
+    """Do what ``operation`` names; all arguments are integers or addresses.
 
     RESET: put the trajectory at the state at ``out``. ADVANCE: see `loop.advance`.
     TAKE: take up to ``budget`` steps, none beyond times[0], which are then in ``times``.

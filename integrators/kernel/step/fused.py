@@ -47,7 +47,7 @@ def compile_iterations(system: System, quantity: emit.Quantity, lanes: int, rows
 
     Parameters
     ----------
-    system, what, lanes
+    system, quantity, lanes
         As for `field.compile_field`; ``lanes`` are all stages.
     rows : int
         Components of a stage.

@@ -183,7 +183,7 @@ def stop_at(ctx, partial, t):
 
 @compiled
 def followed(ctx, step, operation):
-    """Let vectors that follow ``ctx`` know of ``what`` of a step, whole or partial; return the outcome."""
+    """Tell vectors that follow ``ctx`` of an operation on a step, whole or partial; return the outcome."""
     if ctx.follow == 0:
         return DONE
     step.samples_written = ctx.samples_written

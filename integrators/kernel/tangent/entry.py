@@ -151,7 +151,7 @@ def differentiate(ctx, trajectory, vectors, earlier, part, pulls):
 
 @compiled
 def write_vectors(memory, g, first, vectors, state, written):
-    """Write the vectors of a group to sample number ``made``."""
+    """Write the vectors of a group to sample number ``written``."""
     count, dim, rows, room = memory.count, memory.dim, memory.rows, memory.room
     write(vectors, state, room)
     for v in range(memory.vectors[g]):
