@@ -21,7 +21,8 @@ from problems.trace.functions import FUNCTIONS
 from problems.trace.graph import reachable
 
 LANES = 8  # of a register of AVX-512
-SOON = ("const", "symbol", "index", "add", "sub", "mul", "neg", "pow", "sum")  # operations not waited for
+# Operations not waited for
+SHORT_LATENCY = ("const", "symbol", "index", "add", "sub", "mul", "neg", "pow", "sum")
 STAGES = 16  # at most: their sums are written out
 UNROLLED = 640  # products of an iteration that are written out, at most
 FEW_ROWS, FEW_CALLS = 4, 3  # where both are exceeded, no products are written out
@@ -171,7 +172,7 @@ def width_for(system: System, second: bool, rows: int, varying: bool) -> int:
     6 % with adaptive steps, the double pendulum 36 %.
     """
     nodes = reachable(system.function("force" if second else "field").roots)
-    waits = any(node.op not in SOON for node in nodes)
+    waits = any(node.op not in SHORT_LATENCY for node in nodes)
     if not machine.many_registers():
         return 2 * LANES if rows == 1 and waits else LANES
     if rows > 4 or not (varying or waits):

@@ -32,7 +32,7 @@ from problems import emit
 from problems.systems.base import System
 
 INFINITY = float("inf")
-ABREAST = 2  # rows of a product side by side: their sums stay in registers, and share its matrix
+ROWS_AT_A_TIME = 2  # rows of a product side by side: their sums stay in registers, and share its matrix
 
 
 Blocks = tuple[tuple[int, int, int], ...]
@@ -342,12 +342,12 @@ class Steps(Writer):
         return totals
 
     def few_rows(self, body: Callable[[list[Index]], None]) -> None:
-        """Write ``body`` for `ABREAST` components of a stage at a time."""
+        """Write ``body`` for `ROWS_AT_A_TIME` components of a stage at a time."""
         if not self.unrolled:
             self.each_row(lambda d: body([d]))
             return
-        for first in range(0, self.form.rows, ABREAST):
-            body([*range(first, min(first + ABREAST, self.form.rows))])
+        for first in range(0, self.form.rows, ROWS_AT_A_TIME):
+            body([*range(first, min(first + ROWS_AT_A_TIME, self.form.rows))])
 
     def predict(self) -> None:
         """First values: the last step's polynomial at the nodes of this one."""

@@ -47,7 +47,7 @@ from integrators.kernel.step.sums import time_of_step
 
 DEEPEST = 8  # times that a step is halved where samples do not resolve a function
 ISOLATED = 16  # changes of sign in a part that is not resolved: a pole, a jump or a corner makes fewer
-LOST = 4.0  # times the rounding of one state: what many steps leave of a g that vanishes all along
+NOISE_FACTOR = 4.0  # times the rounding of one state: what many steps leave of a g that vanishes all along
 SHORTEST = 1e-6  # of a step is more than a unit in the last place of time: else there is no point inside
 SAME = 1e-5  # of a step: a touch as close to another zero is none of its own
 ULP = 2.0**-52
@@ -289,7 +289,7 @@ def vanishes(ctx, search):
 @compiled
 def is_nothing(ctx, search, x):
     """Whether the value at a point may be rounding's."""
-    return abs(value_at(ctx, search, x)) <= LOST * noise_at(ctx, search, x)
+    return abs(value_at(ctx, search, x)) <= NOISE_FACTOR * noise_at(ctx, search, x)
 
 
 @compiled

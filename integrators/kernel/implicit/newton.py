@@ -28,7 +28,7 @@ MOST_BLENDED = 250
 STAGNATION_LIMIT = 2  # changes that do not decrease, to end it between ROUNDING and STAGNATION ...
 STILL_CONVERGING = 0.5  # ... unless the changes of all but the smallest components still decrease so fast
 FORESEEN = 0.1  # a change that is going to be this part of the tolerance need not be seen
-FORGET = 0.7  # of the rate of contraction, from one step to the next
+RATE_DECAY = 0.7  # of the rate of contraction, from one step to the next
 SLOW = 0.2  # a Jacobian whose corrections contract no better is replaced at the next step
 HOPELESS = 4  # corrections that do not decrease, or grow, to give up
 OLDEST = 64  # steps for which a Jacobian is used, so that the contraction is known anew
@@ -84,7 +84,7 @@ def iterate(ctx, m, which):
     else:
         return DIVERGED
     if worst > 0.0:
-        m.rate = worst if rate == 1.0 else max(worst, FORGET * rate)
+        m.rate = worst if rate == 1.0 else max(worst, RATE_DECAY * rate)
     if worst > SLOW and m.method == NEWTON:
         m.stale = 1
     return DONE

@@ -10,14 +10,14 @@ from integrators.kernel.step.begin import INFINITY
 from integrators.kernel.step.control import RETREAT, SHORTEST, SHRINK, TIME_TOLERANCE
 from integrators.kernel.step.estimate import (
     NARROWEST,
-    OUTSIDE,
+    SMOOTH_GAP,
     block_size,
     coefficient,
     estimate,
     is_gap,
 )
 
-JUST = 1e-12  # part of a step: as near to a breakpoint the field is looked at
+BREAKPOINT_OFFSET = 1e-12  # part of a step: as near to a breakpoint the field is looked at
 
 
 @compiled
@@ -140,7 +140,7 @@ def differs_at_an_end(ctx):
     rows, lanes, second = ctx.rows, ctx.lanes, ctx.second
     # Stages at both ends, in memory that the solved step does not need any more; idle lanes repeat the last.
     stages, times, values = ctx.scratch.old_stages, ctx.times, ctx.scratch.sums
-    inside = max(JUST * h, 2.0 * SHORTEST * abs(t))
+    inside = max(BREAKPOINT_OFFSET * h, 2.0 * SHORTEST * abs(t))
     inside = inside if ctx.h > 0.0 else -inside
     times[0] = t + inside if discontinuities.boundary == START else t
     for lane in range(1, lanes):
@@ -165,7 +165,7 @@ def differs_at_an_end(ctx):
             after = 0.0
         far = max(finite(before), finite(after))
         # A crossing beyond the last node is no smooth field's distance from its polynomial.
-        smooth = 0.0 if surfaces.crossed else OUTSIDE * discontinuities.last_coefficients[d]
+        smooth = 0.0 if surfaces.crossed else SMOOTH_GAP * discontinuities.last_coefficients[d]
         if far > smooth and far > least * block_size(ctx, ctx.blocks.of_row[d]):
             return True
         if discontinuities.boundary == EXTRAPOLATED and differs_from_previous(ctx, d, values[lanes * d]):
@@ -190,7 +190,7 @@ def differs_from_previous(ctx, d, value):
     """Whether the polynomial of the previous step is far from the field's value at its end, in row d."""
     far = finite(abs(value - previous_end(ctx, d)))
     least = ctx.discontinuities.negligible / (abs(ctx.controller.previous_length) * ctx.tables.nodes[0])
-    return far > OUTSIDE * ctx.discontinuities.previous_last_coefficients[d] and far > least * block_size(
+    return far > SMOOTH_GAP * ctx.discontinuities.previous_last_coefficients[d] and far > least * block_size(
         ctx, ctx.blocks.of_row[d]
     )
 

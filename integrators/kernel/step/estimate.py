@@ -23,7 +23,7 @@ from integrators.kernel.simd.operations import greatest, least, size, where
 from integrators.kernel.step.begin import prepare, set_step, start_plain
 from integrators.kernel.step.control import INFINITY, TINY
 from integrators.kernel.step.fixed_point import evaluate
-from integrators.kernel.step.rule import FIRST_AT_REST, NOTHING, RESTART, SMALLEST
+from integrators.kernel.step.rule import FIRST_AT_REST, LEAST_BLOCK, RESTART, SMALLEST
 from integrators.kernel.step.stages import offset
 
 # Part of a block that rounding accounts for in a step that the fixed-point iteration solves
@@ -31,12 +31,14 @@ ROUNDING_PART = 1e-13
 SLIGHT = 1e-3  # part of the error allowed that a discontinuity counts as where it is negligible
 NARROWEST = 1e-12  # part of the time: shorter steps do not look for a discontinuity any more
 # Times as much is negligible in such a step: next to a zero of a component none might be short enough.
-BESIDE_NOTHING = 1e3
-OUTSIDE = 100.0  # times the last coefficients: a smooth field is no farther from its polynomial at the ends
+NARROW_STEP_FACTOR = 1e3
+# Times the last coefficients: a smooth field is no farther from its polynomial at the ends
+SMOOTH_GAP = 100.0
 # A component's low coefficients that are larger than this part of all do not fall off, and are those of a
 # mode at rest where the error they would make is at most that part of the allowed one; see `log_decay`.
 NOT_DECAYING, AT_REST = 0.1, 0.1
-ALIKE = 1e-14  # part of the field's mean that its other coefficients are at most where it does not change
+# Part of the field's mean that its other coefficients are at most where it does not change
+EQUAL_VALUES = 1e-14
 
 
 @compiled
@@ -110,7 +112,7 @@ def is_gap(apart, last, previous_last):
     last, previous_last : float
         The last coefficients of the steps.
     """
-    return apart > OUTSIDE * (last + previous_last)
+    return apart > SMOOTH_GAP * (last + previous_last)
 
 
 @compiled
@@ -169,7 +171,7 @@ def is_doubtful(low, high, doubt):
 @for_both_widths
 def changes(low, high, gamma_0):
     """Whether a row of the field has not the same value at all nodes."""
-    return greatest(low, high) > ALIKE * gamma_0
+    return greatest(low, high) > EQUAL_VALUES * gamma_0
 
 
 @for_both_widths
@@ -223,7 +225,7 @@ def size_in_step(scale, largest):
     scale, largest : float
         Of the block, and the largest in its group.
     """
-    return greatest(greatest(scale, NOTHING * largest), SMALLEST)
+    return greatest(greatest(scale, LEAST_BLOCK * largest), SMALLEST)
 
 
 @for_both_widths
@@ -338,7 +340,7 @@ def estimate(ctx):
                 high = 0.0
             most, most_quadrature_error = INFINITY, INFINITY
             if doubtful and high > 0.0:
-                slight = BESIDE_NOTHING * negligible if narrow else negligible
+                slight = NARROW_STEP_FACTOR * negligible if narrow else negligible
                 if (
                     discontinuities.count > 0
                     and h * max(high, max(gamma_error, gamma_last)) <= slight * scale

@@ -6,7 +6,7 @@ from integrators.kernel.simd.memory import call_follow, get, put
 from integrators.kernel.step.advance import solve
 from integrators.kernel.step.begin import predict, prepare, rewind, set_step
 from integrators.kernel.step.discontinuities import keep_end_of_part
-from integrators.kernel.step.estimate import ALIKE
+from integrators.kernel.step.estimate import EQUAL_VALUES
 from integrators.kernel.step.finish import arrive, finish
 from integrators.kernel.step.fixed_point import project
 from integrators.kernel.step.size import take_sizes
@@ -141,7 +141,7 @@ def changes(ctx):
         first = ctx.values[ctx.lanes * d]
         for i in range(1, ctx.k):
             value = ctx.values[ctx.lanes * ((i // ctx.lanes) * ctx.padded + d) + i % ctx.lanes]
-            if abs(value - first) > ALIKE * abs(first):
+            if abs(value - first) > EQUAL_VALUES * abs(first):
                 return True
     return False
 

@@ -8,7 +8,7 @@ its group, so there are two measures, by `Blocks.weights` and by `Blocks.floored
 from integrators.kernel.native.jit import compiled, for_both_widths
 from integrators.kernel.simd.memory import get, larger, largest, splat8, spread
 from integrators.kernel.simd.operations import greatest, size, where
-from integrators.kernel.step.rule import FLOOR, LARGE, NOTHING, SMALLEST
+from integrators.kernel.step.rule import FLOOR, LARGE, LEAST_BLOCK, SMALLEST
 from integrators.kernel.step.stages import offset
 
 SIZES_LAST = 8  # steps for which the sizes of the blocks are good
@@ -110,7 +110,7 @@ def least_part(varying):
 
     Whether steps vary is known where code for lanes is written, and is the same in all lanes.
     """
-    return NOTHING if varying else 0.0
+    return LEAST_BLOCK if varying else 0.0
 
 
 @compiled
