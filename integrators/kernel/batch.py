@@ -4,7 +4,7 @@ They go in lanes, one in each lane of the vector unit (`integrators.kernel.ensem
 one by one where that cannot be: with an implicit solver, more than sixteen stages, steps that
 something else than the tolerance limits, a field that does not run on lanes, or switches in the state. One
 whose equations the iteration does not solve, or is slow to solve, leaves its lane and goes by itself, from
-its start; so does one with steps of its own length whose field has a discontinuity.
+its start; so does one with adaptive steps whose field has a discontinuity.
 """
 
 from collections import deque

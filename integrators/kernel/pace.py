@@ -3,7 +3,7 @@
 from time import perf_counter
 
 SOON = 0.05  # seconds from one look to the next, about
-FEWEST = 16  # steps before the first look, where they may be dear
+FEWEST = 16  # steps before the first look, where they may be expensive
 
 
 class Pace:

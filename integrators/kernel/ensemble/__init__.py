@@ -1,1 +1,1 @@
-"""Trajectories in lanes: many starts of one system, one in each lane of the vector unit."""
+"""Trajectories in lanes: many initial conditions of one system, one in each lane of the vector unit."""

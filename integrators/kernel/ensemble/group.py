@@ -77,7 +77,8 @@ class Group(Memory):
     quadrature_error_decay = Real()
     least_slope = Real()
     doubt = Real()
-    negligible = Real()  # part of a block's size that the error at a jump may be; infinite: nobody looks
+    # Part of a block's size that the error at a jump may be; infinite: it is not looked for
+    negligible = Real()
     outermost = Real()  # the first node
     # The field at the end of the previous step; see `Discontinuities.boundary_values`
     ends = Array("rows", "lanes")

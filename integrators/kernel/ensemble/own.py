@@ -1,4 +1,4 @@
-"""Trajectories in lanes, each with steps of its own length, and the next one where one has ended.
+"""Trajectories in lanes, each with an adaptive step size, and the next one where one has ended.
 
 Steps are done on all lanes at once by the code of `integrators.kernel.ensemble.steps`, and most of them
 are judged and followed there too (`integrators.kernel.ensemble.control`). Elsewhere, whether a step is

@@ -23,7 +23,7 @@ from problems.trace.graph import reachable
 LANES = 8  # of a register of AVX-512
 # Operations not waited for
 SHORT_LATENCY = ("const", "symbol", "index", "add", "sub", "mul", "neg", "pow", "sum")
-STAGES = 16  # at most: their sums are written out
+STAGES = 16  # at most: their sums are unrolled
 UNROLLED = 640  # products of an iteration that are written out, at most
 FEW_ROWS, FEW_CALLS = 4, 3  # where both are exceeded, no products are written out
 ROOM = 4096  # rows of all stages, at most: beyond, a group of trajectories does not fit in the nearest caches
@@ -45,7 +45,7 @@ class Lanes:
     unit : bool
         Whether the rows' factors can be in the matrix; see `integrators.kernel.tables.unit`.
     varying : bool
-        Whether each trajectory has steps of its own length.
+        Whether each trajectory has adaptive steps.
 
     Raises
     ------
@@ -181,7 +181,7 @@ def width_for(system: System, second: bool, rows: int, varying: bool) -> int:
 
 
 def unrolled_for(system: System, second: bool, k: int, rows: int) -> bool:
-    """Return whether stages and rows are written out, so that a step's values are in registers.
+    """Return whether stages and rows are unrolled, so that a step's values are in registers.
 
     The field is written out with them. With many exponentials, sines, ... that is more code than the nearest
     cache has: in loops, steps of Toda lattices of six to eight take 7 to 18 % less, those of a double

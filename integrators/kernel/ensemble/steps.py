@@ -55,7 +55,7 @@ class Form:
         Whether every lane has a step of its own length. The matrix is that of a step of 1, the end of the
         step goes to `Group.next_state`, and a lane whose equations are not solved is not alive then.
     unrolled : bool
-        Whether stages and rows are written out; see `ensemble.prepared.unrolled_for`.
+        Whether stages and rows are unrolled; see `ensemble.prepared.unrolled_for`.
     judged : tuple of int
         Degrees of the Legendre coefficients that such a step is judged by; see `tables.degrees_judged`.
     groups : tuple of tuple of int

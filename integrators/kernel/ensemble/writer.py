@@ -23,7 +23,7 @@ class Writer:
     lanes : int
         Length of a row.
     unrolled : bool
-        Whether loops are written out; rows then are in registers, as far as there are any.
+        Whether loops are unrolled; rows then are in registers, as far as there are any.
     """
 
     def __init__(self, inner: str, lanes: int, *, unrolled: bool):

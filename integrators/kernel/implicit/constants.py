@@ -12,7 +12,7 @@ from integrators.kernel.tables import Constants, constants
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-MOST_EIGENVECTORS = 22  # degree up to which X_s has eigenvectors to speak of: their condition is 1e12 there
+MOST_EIGENVECTORS = 22  # degree up to which X_s has usable eigenvectors: their condition number is 1e12 there
 NEWTON, BLENDED = range(2)
 """How corrections are computed."""
 

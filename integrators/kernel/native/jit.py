@@ -101,7 +101,7 @@ compiled: Any = _way.compiled
 """Decorate a function of the kernel: numba code that allocates nothing and raises nothing."""
 
 for_both_widths: Any = _way.for_both_widths
-"""Decorate a rule, which is compiled for one number and written out for a row of them.
+"""Decorate a rule, which is compiled for one number and emitted for a row of them.
 
 It has no branches, and its operations are those of `integrators.kernel.simd.operations`. Called by a
 `compiled` function it is one; called by Python, where the code of lanes is written, it writes

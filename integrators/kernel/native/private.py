@@ -140,7 +140,7 @@ class _Rule(_Function):
 
 
 def for_both_widths(function: Any) -> Any:
-    """Decorate a rule, which is compiled for one number and written out for a row of them.
+    """Decorate a rule, which is compiled for one number and emitted for a row of them.
 
     It has no branches, and its operations are those of `integrators.kernel.simd.operations`. Called by a
     `compiled` function it is one; called by Python, where the code of lanes is written, it writes

@@ -32,13 +32,13 @@ def solve(ctx):
 
 @compiled
 def watched(ctx):
-    """Whether anybody wants to see each step before it is taken, and so no step that is undone."""
+    """Whether each step is to be seen before it is taken, and so no step that is undone."""
     return ctx.events.code != 0 or ctx.follow != 0
 
 
 @compiled
 def looked(ctx):
-    """Look for events in the step ahead, and let vectors follow it, if anybody wants that; the outcome."""
+    """Look for events in the step ahead, and let vectors follow it, if that is asked for; the outcome."""
     events = ctx.events
     outcome = call_look(events.code, ctx, events.memory) if events.code and events.act == 0 else DONE
     if outcome == DONE and ctx.follow:

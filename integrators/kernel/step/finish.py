@@ -2,8 +2,8 @@
 
 The weights' low parts enter the products with the field before anything is rounded. Of the last sums over
 the stages, and of all that is done with them until the state is added, what is rounded away is kept: errors
-at the size of an increment would be the largest of a step, and make a random walk of the energy. (To keep
-the errors of all sums and products makes the walk a fifth smaller, and steps of eight stages 6 % longer.)
+at the size of an increment would be the largest of a step, and cause a random walk of the energy error. (To
+keep the errors of all sums and products makes it a fifth smaller, and steps of eight stages 6 % longer.)
 """
 
 from integrators.kernel.context import ARRIVE, BY_INCREMENT, DONE, END, NOT_FINITE, UNSOLVED

@@ -27,15 +27,15 @@ FAST_RATE = 0.15
 LEAST = 3e-17  # smaller changes are rounding
 TOTAL_DECREASE = 1e15
 # What may be left of a change when the step is solved. On the outer Solar System 3e-17, and values at the
-# stages before the last change, let the energy leak 7e-20 per step (Gauss(8), h = 1 year): in 1e6 years more
-# than rounding adds; with 1e-18 nothing is seen of it. But with 1e-18 an oscillator's energy falls by 2.1e-19
-# of itself in each step of length 0.5 (HBVM(8, 4), 48 starts, +- 0.1e-19); with 3e-19 it rises by 0.3e-19,
-# for one iteration in thirty more, and with 1e-19 nothing is seen, for one in twelve.
-# Adaptive steps are longer and fewer. With 3e-17 they take one iteration in ten less than with 1e-18, and
-# the energy of 48 outer Solar Systems moves as little in 3e4 steps (rms 4.3e-14 and 4.1e-14), as that of
-# Kepler's and Henon and Heiles' problems does in 1e5 to 3e5. With 3e-16 these lose 1e-18 in each step, with
-# 3e-15 3 to 8e-18. At loose tolerances it is seen: a pendulum's energy grows by 2.3e-18 in each step of
-# HBVM(12, 6) at 1e-8, and not with 3e-19, which excites fast oscillations at rest, though.
+# stages before the last change, let the energy drift by 7e-20 per step (Gauss(8), h = 1 year): in 1e6 years
+# more than rounding adds; with 1e-18 nothing is seen of it. But with 1e-18 an oscillator's energy falls by
+# 2.1e-19 of itself in each step of length 0.5 (HBVM(8, 4), 48 initial conditions, +- 0.1e-19); with 3e-19 it
+# rises by 0.3e-19, for one iteration in thirty more, and with 1e-19 nothing is seen, for one in twelve.
+# Adaptive steps are longer and fewer. With 3e-17 they take one iteration in ten less than with 1e-18, and the
+# energy of 48 outer Solar Systems moves as little in 3e4 steps (rms 4.3e-14 and 4.1e-14), as that of Kepler's
+# and Henon and Heiles' problems does in 1e5 to 3e5. With 3e-16 these lose 1e-18 in each step, with 3e-15 3 to
+# 8e-18. At loose tolerances it is seen: a pendulum's energy grows by 2.3e-18 in each step of HBVM(12, 6) at
+# 1e-8, and not with 3e-19, which excites fast oscillations at rest, though.
 LOG_RESIDUAL, LOG_RESIDUAL_VARYING = log2(3e-19), log2(3e-17)
 # Iterations after which a start is given up: for one without extrapolation, or, if it was one, for a shorter
 # step or the implicit solver. In lanes all the others wait; there a trajectory that has had twice as many

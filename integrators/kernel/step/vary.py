@@ -63,7 +63,7 @@ TARGET_ITERATIONS = 18.0
 # The implicit solver takes over after so many steps in a row that the iteration keeps from growing where the
 # errors would allow so much longer ones. Its steps cost one or two of 18 iterations through memory, and ten
 # of those of few rows or of the second-order form; the more rows, the more. Beyond MOST_ROWS they are too
-# dear to be tried where only low coefficients tell how much longer.
+# expensive to be tried where only low coefficients tell how much longer.
 LIMITED_STEPS = 8
 LIMITED_GROWTH = 1.2
 GAIN, GAIN_LIGHT, GAIN_PER_ROW, MOST_ROWS = 3.0, 6.0, 0.1, 64
@@ -89,7 +89,7 @@ def attempt(ctx, h):
     """Solve the step of length h from the state; return the outcome."""
     set_step(ctx, h)
     if ctx.implicit.active:
-        ctx.solver.rate = FIRST_RATE  # nobody knows what it will be afterwards
+        ctx.solver.rate = FIRST_RATE  # it is unknown afterwards
         outcome = solve_implicitly(ctx, ctx, 0)
     else:
         begin(ctx)

@@ -17,7 +17,7 @@ from problems.trace.graph import reachable
 
 MOST = 8  # vectors in a group
 FEWEST = 2  # samples that there is room for, of which nobody may want to know: those of single steps
-OPERATIONS = 1000  # of the derivatives of a group, about: what is written out takes its time to be compiled
+OPERATIONS = 1000  # of the derivatives of a group, about: unrolled code takes long to compile
 
 
 class Vectors:
