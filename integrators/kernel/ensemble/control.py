@@ -47,7 +47,7 @@ class Control:
     `discontinuities` and `control` that a single trajectory calls, applied to rows. What differs:
     coefficients are sums in another order, so that they differ in the last bits; lengths are not rounded to
     ratios with tables, of which lanes have none; and only the ordinary end of a step is written. Every other
-    one is left to `own.settle`.
+    one is left to `own.end_attempt`.
 
     Parameters
     ----------
@@ -206,7 +206,7 @@ class Control:
         apart = (start - previous).absolute()
         return where(is_gap(apart, last, previous_last), apart, 0.0)
 
-    def aim(self) -> None:
+    def set_factor(self) -> None:
         """Set the `factor` of the next step's length to this one's; see `integrators.kernel.step.control`."""
         from integrators.kernel.step.control import (
             APPROACH,
@@ -261,7 +261,7 @@ class Control:
                 self.number("allowed_quadrature_error"),
             ).value,
         )
-        self.aim()
+        self.set_factor()
         length = w.h * self.factor
         t, low = time_after(self.row("t0"), self.row("time_low"), w.h)
         time_left, since = (self.row("stop") - t) - low, self.row("since") + 1.0

@@ -82,7 +82,7 @@ def load(group, lane):
 
 
 @compiled
-def aim(group, lane):
+def set_attempt(group, lane):
     """Set the length of a lane's next step; return 0 if none is short enough."""
     ctx = context_at(group.contexts[lane])
     h, length = within(ctx, ctx.controller.next_length), ctx.length
@@ -111,7 +111,7 @@ def aim(group, lane):
 
 
 @compiled
-def enter(group, lane):
+def fill_lane(group, lane):
     """Have a lane ready for a step, with the next trajectory if it has none; return 0 if there is none."""
     while True:
         if group.member[lane] < 0:
@@ -119,7 +119,7 @@ def enter(group, lane):
                 group.alive[lane] = 0.0
                 return 0
             load(group, lane)
-        elif aim(group, lane):
+        elif set_attempt(group, lane):
             return 1
         else:
             unload(group, lane, LEFT)
@@ -149,7 +149,7 @@ def catch_up(group, lane, ctx):
 
 
 @compiled
-def settle(group, lane):
+def end_attempt(group, lane):
     """Take the step that was tried in a lane, if it is good enough."""
     ctx = context_at(group.contexts[lane])
     if group.since[lane] > 0.0:
@@ -194,13 +194,13 @@ def step(group, lane, ctx):
 def leave_if_slow(group, lane, ctx):
     """Let a trajectory leave its lane where it needs another solver, vanishes, or does not get anywhere."""
     if group.member[lane] >= 0 and (
-        ctx.implicit.slow >= LIMITED_STEPS or vanishes(ctx) or has_stalled(group, lane, ctx)
+        ctx.implicit.slow >= LIMITED_STEPS or is_near_zero(ctx) or has_stalled(group, lane, ctx)
     ):
         unload(group, lane, LEFT)
 
 
 @compiled
-def vanishes(ctx):
+def is_near_zero(ctx):
     """Whether a state is so near 0 that its steps are solved to less and less of its size in lanes."""
     result = False
     for g in range(ctx.blocks.groups):
@@ -220,7 +220,7 @@ def has_stalled(group, lane, ctx):
 
 
 @compiled
-def share(group, ctx):
+def set_tolerances(group, ctx):
     """Let a group know what its steps are judged by."""
     controller, estimate, discontinuities = ctx.controller, ctx.estimate, ctx.discontinuities
     group.allowed_error, group.allowed_quadrature_error = (
@@ -266,14 +266,14 @@ def run(first, budget):
     lanes = group.lanes
     if group.sample < 0:
         group.sample = 0
-        share(group, context_at(group.contexts[0]))
+        set_tolerances(group, context_at(group.contexts[0]))
         for lane in range(lanes):
             group.member[lane] = -1
             group.ordinary[lane] = 0.0
     while True:
         running = 0
         for lane in range(lanes):
-            running += 1 if group.ordinary[lane] == 1.0 else enter(group, lane)
+            running += 1 if group.ordinary[lane] == 1.0 else fill_lane(group, lane)
         if running == 0 or (group.more and running < lanes):
             return 1
         if budget <= 0 or not (group.events == 0 or has_room(group)):
@@ -287,6 +287,6 @@ def run(first, budget):
             if group.member[lane] < 0:
                 continue
             if group.ordinary[lane] == 0.0:
-                settle(group, lane)
+                end_attempt(group, lane)
             elif group.events and not watch_ordinary(group, lane):
                 leave_if_slow(group, lane, context_at(group.contexts[lane]))

@@ -230,7 +230,7 @@ def examine(ctx, search):
         note_samples(search, degree, finite)
     if unresolved and search.resolution < SHORTEST:
         return divide(ctx, search)
-    return settle(ctx, search, degree, unresolved)
+    return find_events(ctx, search, degree, unresolved)
 
 
 @compiled
@@ -260,7 +260,7 @@ def divide(ctx, search):
             if unresolved and size > 1 and search.resolution < SHORTEST:
                 size //= 2
                 continue
-            outcome = settle(ctx, search, FINEST, unresolved)
+            outcome = find_events(ctx, search, FINEST, unresolved)
             if outcome != GOING:
                 return outcome
             start_value = search.end_value
@@ -293,7 +293,7 @@ def is_nothing(ctx, search, x):
 
 
 @compiled
-def settle(ctx, search, degree, unresolved):
+def find_events(ctx, search, degree, unresolved):
     """Find the zeros in the stretch, and note what happens there."""
     if unresolved:
         keep_samples(search, degree)

@@ -61,7 +61,7 @@ def iterate_to_end(ctx):
     """Iterate with tests until the step is solved or has failed; return the outcome."""
     while ctx.solver.outcome == RUNNING:
         test(ctx, iterate_measured(ctx, 0))
-    return close(ctx)
+    return end_iteration(ctx)
 
 
 @compiled
@@ -85,7 +85,7 @@ def restart(ctx, outcome):
 
 
 @compiled
-def close(ctx):
+def end_iteration(ctx):
     """Keep the books of an iteration that has come to its end; return the outcome."""
     solver = ctx.solver
     count(ctx)

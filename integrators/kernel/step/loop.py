@@ -8,7 +8,7 @@ from integrators.kernel.step.advance import looked, step, watched
 from integrators.kernel.step.discontinuities import confirm_previous_step, is_smooth_to_end
 from integrators.kernel.step.estimate import shorten_first
 from integrators.kernel.step.sample import dimension, followed, sample, write
-from integrators.kernel.step.vary import TIME_TOLERANCE, ready, remaining, take
+from integrators.kernel.step.vary import TIME_TOLERANCE, remaining, solve_adaptive, take
 
 context = view(Context)
 
@@ -41,7 +41,7 @@ def approach(ctx, t, budget):
             if confirm_previous_step(ctx):
                 return DONE, budget
             continue
-        outcome = ready(ctx)
+        outcome = solve_adaptive(ctx)
         if outcome != DONE:
             return outcome, budget
         if ctx.t0 != begin:  # the previous step was undone
@@ -141,7 +141,7 @@ def take_steps(ctx, times, out, budget):
         if over and confirm_previous_step(ctx):
             return DONE if remaining(ctx, end) == 0.0 else BUDGET
         if not over:
-            outcome = ready(ctx)
+            outcome = solve_adaptive(ctx)
         if ctx.counters.steps < taken:
             count -= 1
             ctx.samples_written = count

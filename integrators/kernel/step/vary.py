@@ -46,7 +46,7 @@ from integrators.kernel.step.estimate import estimate, estimate_implicit, log_de
 from integrators.kernel.step.finish import count_step, finish
 from integrators.kernel.step.fixed_point import iterate_measured
 from integrators.kernel.step.graze import grazes
-from integrators.kernel.step.iterate import close, extra_iterations, iterate_to_end, test
+from integrators.kernel.step.iterate import end_iteration, extra_iterations, iterate_to_end, test
 from integrators.kernel.step.reversible import keep_pace
 from integrators.kernel.step.rule import FARTHEST, FIRST_RATE, ROUNDING, SCALE_LASTS, SHORTEST_PART
 from integrators.kernel.step.solver_switch import request_solver, solve_implicitly
@@ -131,11 +131,11 @@ def iterate(ctx):
             elif takes_too_long(change, rate, tries, solver.log_residual, TARGET_ITERATIONS):
                 solver.outcome = DIVERGED  # not yet, but a shorter step is cheaper
                 solver.rate = known
-    return close(ctx)
+    return end_iteration(ctx)
 
 
 @compiled
-def aim(ctx, error, quadrature_error, most_growth):
+def length_factor(ctx, error, quadrature_error, most_growth):
     """Return the next step's length relative to this one's, from what is estimated for this one."""
     controller = ctx.controller
     if not error < INFINITY:
@@ -238,7 +238,7 @@ def within(ctx, h):
 
 
 @compiled
-def ready(ctx):
+def solve_adaptive(ctx):
     """Solve the step ahead with a length that the tolerance allows; `Context.h` is its length."""
     controller = ctx.controller
     if ctx.solved:
@@ -335,7 +335,7 @@ def accepts(ctx, outcome, iterations, implicit):
     """
     controller, surfaces = ctx.controller, ctx.surfaces
     error, quadrature_error = estimate_attempt(ctx, outcome, implicit)
-    factor = aim(ctx, error, quadrature_error, MOST_GROWTH if controller.attempts == 0 else 1.0)
+    factor = length_factor(ctx, error, quadrature_error, MOST_GROWTH if controller.attempts == 0 else 1.0)
     if outcome == DONE and ctx.estimate.constant_field and abs(ctx.h) > controller.longest_constant:
         reject(ctx, outcome, controller.longest_constant / abs(ctx.h), implicit)
         return False
@@ -343,7 +343,7 @@ def accepts(ctx, outcome, iterations, implicit):
     if surfaces.code and (surfaces.locating or (surfaces.across != NO_SURFACE and not good)):
         verdict = locate(ctx, outcome, good)
         if verdict == AGAIN:
-            again(ctx, outcome, implicit)
+            retry(ctx, outcome, implicit)
             return False
         if verdict == REACHED:
             end_on_surface(ctx, factor, iterations, implicit)
@@ -355,7 +355,7 @@ def accepts(ctx, outcome, iterations, implicit):
     if not good:
         reject(ctx, outcome, factor, implicit)
         return False
-    follow(ctx, factor, iterations, implicit)
+    set_next_length(ctx, factor, iterations, implicit)
     return True
 
 
@@ -390,7 +390,7 @@ def estimate_attempt(ctx, outcome, implicit):
 
 
 @compiled
-def follow(ctx, factor, iterations, implicit):
+def set_next_length(ctx, factor, iterations, implicit):
     """Set the length of the step after the attempted one, which is good enough.
 
     Parameters
@@ -423,7 +423,7 @@ def follow(ctx, factor, iterations, implicit):
 
 
 @compiled
-def again(ctx, outcome, implicit):
+def retry(ctx, outcome, implicit):
     """Forget the attempted step, whose next attempt is to end on a switching surface."""
     if implicit:
         ctx.counters.implicit_steps -= 1
@@ -437,7 +437,7 @@ def again(ctx, outcome, implicit):
 def end_on_surface(ctx, factor, iterations, implicit):
     """Let the attempted step, which ends on a switching surface, be followed by one as long as was wanted."""
     record(ctx, ctx.t0 + ctx.h, 0.0)
-    follow(ctx, factor, iterations, implicit)
+    set_next_length(ctx, factor, iterations, implicit)
     ctx.surfaces.reached = 1
     wanted = ctx.surfaces.length_wanted
     if abs(wanted) > abs(ctx.controller.length_after):
