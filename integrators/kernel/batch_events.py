@@ -130,6 +130,10 @@ class _Work(Work):
         found = lanes.occurrences()
         for i in np.flatnonzero(arrived).tolist():
             self.happened[i] = {name: each[i] for name, each in found.items()}
+        for i in np.flatnonzero(arrived >= BY_EVENT).tolist():  # a sample at its time is the state after it
+            last = self.happened[i][names[arrived[i] - BY_EVENT]]
+            if last.after is not None:
+                result.y[i, result.t == stops[i]] = last.after[-1]
 
 
 @dataclass(frozen=True, eq=False)

@@ -552,6 +552,9 @@ class HBVMStepper(ABC):
                 reason = self._ended(ctx.counters.steps - before)
         if self._vectors:
             self._vectors.note(times[:count])
+        elif outcome == HALTED and self.search and self.search.hits.stop in times[count : count + 1]:
+            _, out[count] = self.search.hits.last()  # of a terminal event where the steps end too
+            count += 1
         return out[:count], outcome, reason
 
     def _budget(self) -> int:

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import integrators
-from integrators import HBVM, Event, Gauss, LineIntegral, integrate
+from integrators import HBVM, Event, Gauss, LineIntegral, integrate, integrate_many
 from integrators.protocol import Status
 from problems import Hamiltonian, InputError, Opaque, Problem, VectorField
 
@@ -297,6 +297,22 @@ def test_the_nth_occurrence_may_be_terminal_and_others_stop_with_it():
     solution, (q, p) = happened(oscillator(), WHOLE, *events)
     assert solution.t_stop == pytest.approx(5 * np.pi, abs=1e-11)
     assert (len(q), len(p)) == (3, 5)
+
+
+@pytest.mark.parametrize("then", [None, lambda q, p: [q[0], -p[0]]], ids=["ends", "ends with an action"])
+@pytest.mark.parametrize("h", [0.5, 0.3, None])
+def test_a_sample_at_a_terminal_event_is_its_state_also_where_the_steps_end_there(h, then):
+    method = Gauss(s=8, tol=1e-12) if h is None else Gauss(s=8, h=h)
+    event = Event(lambda t: t - 2.5, terminal=True, name="stop", then=then)
+    problem, times = oscillator(), [0.0, 1.25, 2.5, 3.0]
+    solution = integrate(problem, method, times, events=event)
+    assert solution.status is Status.EVENT
+    assert solution.t.tolist() == times[:3]
+    assert np.array_equal(solution.y[-1], solution.events["stop"].y[-1])
+    many = integrate_many(problem, method, starts=[problem.y0] * 2, times=times, events=event)
+    # measured 2e-16: lanes add in another order
+    np.testing.assert_allclose(many.y[:, :3], [solution.y] * 2, atol=2e-15)
+    assert np.isnan(many.y[:, 3]).all()
 
 
 def test_events_change_nothing_of_the_samples():
