@@ -223,6 +223,7 @@ def test_conforms(check):
         testing.finds_events_beside_its_steps,
         testing.events_may_change_the_state,
         testing.batches_are_single_trajectories,
+        testing.batches_find_the_events_of_single_trajectories,
         testing.prepared_batches_are_batches,
         testing.threads_change_no_bits,
         testing.the_size_of_a_piece_is_a_count,
