@@ -4,7 +4,6 @@
 """
 
 import json
-import os
 import sys
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict
@@ -21,7 +20,6 @@ TASKS = (
     "own_system", "section", "long_runs", "campaign", "encounters", "stiff", "lattice", "star_cluster",
     "plugin", "exponents", "fit", "impacts", "short", "molecular_dynamics",
 )  # fmt: skip
-BUSY = 0.5  # other processes that wanted a core in the last minute
 INTRODUCTION = """# Fourteen tasks, beside the library one would otherwise use
 
 Each is a short script in [examples](../examples/side_by_side.py), which the tests run. A library is accurate
@@ -46,7 +44,6 @@ def measure() -> None:
     from hbvm_bench.campaign.identity import kernel_digest
     from hbvm_bench.measure import machine
 
-    busy = os.getloadavg()[0]
     day, results, loads = datetime.now(UTC).date().isoformat(), {}, {}
     with ProcessPoolExecutor(1, mp_context=get_context("spawn"), max_tasks_per_child=1) as pool:
         for name in TASKS:
@@ -54,7 +51,6 @@ def measure() -> None:
             print(results[name], end="\n\n", flush=True)
     stored = {
         "machine": machine.sentence(machine.describe(measure=True)),
-        "busy": round(busy, 2),
         "day": day,
         "kernel": kernel_digest(),
         "loads": {name: load for name, load in loads.items() if load is not None},
@@ -65,19 +61,13 @@ def measure() -> None:
 
 def page() -> str:
     """Return the page of what is stored."""
+    from hbvm_bench.report.provenance import measured_on
+    from hbvm_bench.store.records import Load
+
     stored = json.loads(STORED.read_text(encoding="utf-8"))
     lines = [INTRODUCTION, stored["machine"]]
-    if "day" in stored:
-        from hbvm_bench.report.provenance import measured_on
-        from hbvm_bench.store.records import Load
-
-        loads = [Load(others=others, steal=steal) for others, steal in stored["loads"].values()]
-        lines.append(measured_on(stored["day"], stored["kernel"], loads))
-    if stored["busy"] > BUSY:
-        lines.append(
-            f"**Other work ran on the machine ({stored['busy']} processes at the start): these times are "
-            "provisional.**"
-        )
+    loads = [Load(others=others, steal=steal) for others, steal in stored["loads"].values()]
+    lines.append(measured_on(stored["day"], stored["kernel"], loads))
     for name, fields in stored["tasks"].items():
         made = Comparison(**{**fields, "rows": [Row(**row) for row in fields["rows"]]})
         table = ["| | time | first call | energy | error |", "|:--|--:|--:|--:|--:|"]

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from html import escape
 from pathlib import Path
 
-from hbvm_bench.campaign.file import load, shipped
+from hbvm_bench.campaign.file import load, name_of, shipped
 from hbvm_bench.measure import machine
 from hbvm_bench.report import provenance
 from hbvm_bench.report.html import pages
@@ -15,7 +15,7 @@ from hbvm_bench.store import archive
 from hbvm_bench.store.files import write_all
 from hbvm_bench.store.records import Record
 from hbvm_bench.store.stored_run import StoredRun
-from hbvm_bench.summaries import outcomes
+from hbvm_bench.summaries import outcomes, standings
 from hbvm_bench.summaries.table import Table
 from problems.errors import InputError
 
@@ -101,7 +101,7 @@ def conditions(directory: Path) -> Table:
 
 
 def not_measured(directory: Path) -> list[str]:
-    """Return the campaigns of the package without a report here, and the race without its run on AVX2 alone.
+    """Return the campaigns of the package without a report here, and what of the race has no run on AVX2 alone.
 
     Raises
     ------
@@ -113,16 +113,24 @@ def not_measured(directory: Path) -> list[str]:
         for name in shipped()
         if name not in CHECKS and not _document(directory / name)
     ]
-    kept = directory / RACE / archive.NAME
-    if _document(directory / RACE) and not any(kind.endswith(AVX2) for kind in _kinds(kept)):
-        missing.append(f"{RACE} --avx2: {load(RACE).title}, with AVX2 only")
+    if _document(directory / RACE):
+        everywhere, on_avx2 = _race_problems(directory / RACE / archive.NAME)
+        without = [name for name in everywhere if name not in on_avx2]
+        if without or not on_avx2:
+            which = f": {', '.join(without)}" if on_avx2 else ""
+            missing.append(f"{RACE} --avx2: {load(RACE).title}, with AVX2 only{which}")
     return missing
 
 
-def _kinds(path: Path) -> list[str]:
-    """Return the kinds of processor whose results an archive holds; none without an archive."""
-    runs = [run.records() for run in archive.read(path)] if path.is_file() else []
-    return [machine.kind(StoredRun.machine_of(records)) for records in runs if records]
+def _race_problems(path: Path) -> tuple[list[str], list[str]]:
+    """Return the problems with results in an archive, without and with code restricted to AVX2."""
+    problems: tuple[list[str], list[str]] = ([], [])
+    for run in archive.read(path) if path.is_file() else []:
+        if records := run.records():
+            restricted = machine.kind(StoredRun.machine_of(records)).endswith(AVX2)
+            entries = standings.entries(run.index().campaign, records)
+            problems[restricted].extend(name_of(entry) for entry, here in entries if here)
+    return problems
 
 
 def _measured(records: Sequence[Record]) -> tuple[str, ...]:

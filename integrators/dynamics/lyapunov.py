@@ -38,7 +38,7 @@ FIRST = 16  # steps of the first round
 LONGER = 4  # times as many steps in the next round, at most
 ROOM = 1 << 24  # bytes of the vectors of a round's steps, at most
 MOST_DIGITS = 12  # after the decimal point, where exponents are printed
-REPEATED = 64  # rounds from one checkpoint to the next: one takes the time of several short rounds
+REPEATED = 64  # rounds from one checkpoint to the next, at most: one takes the time of a short round
 
 
 @dataclass(frozen=True, eq=False)
@@ -254,12 +254,12 @@ class _Rounds:
         stepper, i, steps = self._stepper, 0, min(FIRST, self._room)
         self.times, self.growth = np.full(marks.size, np.nan), np.zeros((marks.size, self._n))
         most, passed = self._room, -np.inf  # steps of a round before a time where one was too long
-        saved = self._saved(i)
+        saved, apart = self._saved(i), REPEATED
         while i < marks.size:
             if stepper.t > passed:
                 most = self._room
-            if self.rounds >= saved[1] + REPEATED:
-                saved = self._saved(i)
+            if self.rounds >= saved[1] + apart:
+                saved, apart = self._saved(i), min(2 * apart, REPEATED)
             asked = min(steps, most)
             samples = stepper.march(float(marks[i]), asked)
             if samples.status is not Status.FINISHED:
@@ -276,7 +276,8 @@ class _Rounds:
                             stepper.stats.steps,
                         )
                     most, passed = min(most, taken // 2), max(passed, stepper.t)
-                    i = self._back_to(saved)
+                    # where rounds are often repeated, the rounds since the last checkpoint cost more than it
+                    i, apart = self._back_to(saved), max(apart // 4, 1)
                     continue
                 stepper.follow(frame, self._none)
                 self.times[i] = stepper.t

@@ -141,16 +141,13 @@ def test_the_list_of_reports_says_when_and_where_each_was_measured(tmp_path):
 
 
 def test_the_list_of_reports_names_the_campaigns_that_have_none_and_a_race_without_its_run_on_avx2(tmp_path):
-    def measured(*built):
+    def measured(*built, problems=(["pendulum()"], ["pendulum()"])):
         runs = []
-        for features in built:
+        for features, names in zip(built, problems, strict=False):
             timing = Timing(rounds=made_up_run.timed([1.0]), machine={"llvm_processor": "znver5"} | features)
-            record = made_up_run.record("HBVM()", problem="pendulum()", timing=timing)
-            runs.append(
-                StoredRun(
-                    index=Index(campaign=campaign, ids=[record.id], version="0", command=""), records=[record]
-                )
-            )
+            records = [made_up_run.record("HBVM()", problem=name, timing=timing) for name in names]
+            index = Index(campaign=campaign, ids=[one.id for one in records], version="0", command="")
+            runs.append(StoredRun(index=index, records=records))
         made_up_run.archived(tmp_path / "race", *runs)
 
     campaign = Campaign(name="race", problems=["pendulum()"], methods=[MethodEntry(use="HBVM()")])
@@ -165,6 +162,10 @@ def test_the_list_of_reports_names_the_campaigns_that_have_none_and_a_race_witho
     assert "## Not measured\n\n- drift: Conserv" in write_index(tmp_path).read_text(encoding="utf-8")
     measured({}, {"ours_built_for": "AVX2"})
     assert not_measured(tmp_path) == missing
+    campaign = Campaign(name="race", problems=["pendulum()", "kepler()"], methods=[MethodEntry(use="HBVM()")])
+    measured({}, {"ours_built_for": "AVX2"}, problems=[["pendulum()", "kepler()"], ["pendulum()"]])
+    assert not_measured(tmp_path) == [*missing, f"{avx2}: kepler"]
+    measured({}, {"ours_built_for": "AVX2"})
     for name in ("drift", "large"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "report.md").write_text("# A title\n", encoding="utf-8")
