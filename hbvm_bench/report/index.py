@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from html import escape
 from pathlib import Path
 
-from hbvm_bench.campaign.file import load, name_of, shipped
+from hbvm_bench.campaign.file import load, shipped
 from hbvm_bench.measure import machine
 from hbvm_bench.report import provenance
 from hbvm_bench.report.html import pages
@@ -15,7 +15,7 @@ from hbvm_bench.store import archive
 from hbvm_bench.store.files import write_all
 from hbvm_bench.store.records import Record
 from hbvm_bench.store.stored_run import StoredRun
-from hbvm_bench.summaries import outcomes, standings
+from hbvm_bench.summaries import outcomes
 from hbvm_bench.summaries.table import Table
 from problems.errors import InputError
 
@@ -101,7 +101,7 @@ def conditions(directory: Path) -> Table:
 
 
 def not_measured(directory: Path) -> list[str]:
-    """Return the campaigns of the package without a report here, and what of the race has no run on AVX2 alone.
+    """Return the campaigns of the package without a report here, and the problems of the race without AVX2.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def not_measured(directory: Path) -> list[str]:
     ]
     if _document(directory / RACE):
         everywhere, on_avx2 = _race_problems(directory / RACE / archive.NAME)
-        without = [name for name in everywhere if name not in on_avx2]
+        without = [problem for problem in everywhere if problem not in on_avx2]
         if without or not on_avx2:
             which = f": {', '.join(without)}" if on_avx2 else ""
             missing.append(f"{RACE} --avx2: {load(RACE).title}, with AVX2 only{which}")
@@ -128,8 +128,7 @@ def _race_problems(path: Path) -> tuple[list[str], list[str]]:
     for run in archive.read(path) if path.is_file() else []:
         if records := run.records():
             restricted = machine.kind(StoredRun.machine_of(records)).endswith(AVX2)
-            entries = standings.entries(run.index().campaign, records)
-            problems[restricted].extend(name_of(entry) for entry, here in entries if here)
+            problems[restricted].extend(dict.fromkeys(record.case.problem for record in records))
     return problems
 
 

@@ -56,8 +56,8 @@ def of_settings(fastest: Sequence[tuple[str, Mapping[str, Record | None]]]) -> T
         "Best and median of the compilations",
         ("problem", "library", "fastest setting", *SPREAD, "best over best of HBVM and Gauss"),
         rows,
-        "The fastest setting is that of the settings with the errors that the problem asks for, or with a "
-        f"position error of at most {LOOSEST['position_end']:g} where it asks for none. "
+        "The fastest setting that reaches the errors that the problem asks for, or a position error of "
+        f"{LOOSEST['position_end']:g} where it asks for none. "
         "Each compilation, in a fresh process with empty caches, has the median of its samples. The same "
         "code may be slower at other addresses in memory: the best compilation is what a library can "
         "reach.",

@@ -314,12 +314,12 @@ def _spent(seconds: Sequence[float], others: float, steal: float) -> str:
 
 
 def _busy(shares: Sequence[float]) -> str:
-    return (
-        f" Not judged: other work took more than {OTHER_WORK:.0%} of a core during the timing, at most "
-        f"{max(shares):.0%}."
-        if max(shares) > OTHER_WORK
-        else ""
-    )
+    if max(shares) > OTHER_WORK:
+        return (
+            f" Not judged: other work took more than {OTHER_WORK:.0%} of a core during the timing, at most "
+            f"{max(shares):.0%}."
+        )
+    return f" During the timing other work took at most {max(shares):.0%} of a core."
 
 
 def _times(measured: dict[str, exponents.Measured]) -> Table:

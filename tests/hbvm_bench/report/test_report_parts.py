@@ -164,7 +164,7 @@ def test_the_list_of_reports_names_the_campaigns_that_have_none_and_a_race_witho
     assert not_measured(tmp_path) == missing
     campaign = Campaign(name="race", problems=["pendulum()", "kepler()"], methods=[MethodEntry(use="HBVM()")])
     measured({}, {"ours_built_for": "AVX2"}, problems=[["pendulum()", "kepler()"], ["pendulum()"]])
-    assert not_measured(tmp_path) == [*missing, f"{avx2}: kepler"]
+    assert not_measured(tmp_path) == [*missing, f"{avx2}: kepler()"]
     measured({}, {"ours_built_for": "AVX2"})
     for name in ("drift", "large"):
         (tmp_path / name).mkdir()

@@ -120,7 +120,8 @@ def test_the_work_of_processes_that_this_one_started_is_no_other_work():
     assert timing.busy()[2] - before[2] > 0.45
     before = timing.busy()
     waits = f"{spin}\nprint(flush=True)\ninput()"
-    with subprocess.Popen([sys.executable, "-c", waits], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as one:
+    command, pipe = [sys.executable, "-c", waits], subprocess.PIPE
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe) as one:
         one.stdout.readline()
         assert timing.busy()[2] - before[2] > 0.45  # it has not ended
         one.communicate(b"\n")
