@@ -9,7 +9,7 @@ import os
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cache
 from statistics import median, quantiles
@@ -268,14 +268,11 @@ def _compilation(run: Timeable) -> Compile:
 def busy() -> tuple[float, float, float, float]:
     """Return, in seconds, the busy and steal time of all cores, our own, and the wall clock's.
 
-    Our own is that of this process and of all that it started, ended or not.
+    Our own is that of this process and of those that it started and that have ended.
     """
-    all_, own = psutil.cpu_times(), sum(os.times()[:4])
-    for started in psutil.Process().children(recursive=True):
-        with suppress(psutil.Error):  # it has ended since
-            own += sum(started.cpu_times()[:4])
+    all_, own = psutil.cpu_times(), os.times()
     spent = sum(getattr(all_, name, 0.0) for name in ("user", "nice", "system", "irq", "softirq"))
-    return spent, steal_seconds(), own, time.monotonic()
+    return spent, steal_seconds(), sum(own[:4]), time.monotonic()
 
 
 def steal_seconds() -> float:

@@ -87,10 +87,9 @@ def test_the_best_compilation_stands_beside_the_median_for_all_libraries_alike()
     (entry,) = campaign.entries()
     case = Case(problem=repr(make_problem(entry.use)), method="", grid=campaign.grid)
 
-    def measured(method, times):
-        made = record(
-            replace(case, method=method), times=times, metrics={"position_end": 1e-12, "energy_max": 0.0}
-        )
+    def measured(method, times, position=1e-12):
+        errors = {"position_end": position, "energy_max": 0.0}
+        made = record(replace(case, method=method), times=times, metrics=errors)
         rounds = [replace(one, compilation=place) for place, one in enumerate(made.timing.rounds)]
         return replace(made, timing=replace(made.timing, rounds=rounds))
 
@@ -104,3 +103,6 @@ def test_the_best_compilation_stands_beside_the_median_for_all_libraries_alike()
         replace(case, method="HBVM()"), times=[0.4], metrics={"position_end": 1e-12, "energy_max": 0.0}
     )
     assert compilations.table(campaign, [once]) is None
+    anything = replace(campaign, problems=[replace(entry, within={})])  # asks for no accuracy
+    records += [measured("Taylor(tol=0.1)", [0.1, 0.1, 0.1], position=0.5)]
+    assert [row[2] for row in compilations.table(anything, records).rows] == ["HBVM()", "Taylor()"]
