@@ -3,7 +3,6 @@
 from typing import Any
 
 from problems import deprecated
-from problems import mergers as mergers  # so that problems.mergers is there after "import problems"
 from problems.bodies import nbody
 from problems.errors import InputError, MissingLibraryError, UnknownNameError
 from problems.problem import Problem

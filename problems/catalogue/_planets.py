@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 from typing import Literal
 
-from problems.catalogue import _gravity as gravity
+from problems.bodies import gravity
 from problems.problem import Problem
 
 Unit = Literal["year", "day"]

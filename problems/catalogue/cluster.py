@@ -5,7 +5,7 @@ from random import Random
 from typing import Annotated
 
 from problems import limits
-from problems.catalogue import _gravity as gravity
+from problems.bodies import gravity
 from problems.checks import Positive, at_least
 from problems.entry import Expected, entry
 from problems.picture import Orbits

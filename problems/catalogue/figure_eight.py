@@ -1,6 +1,6 @@
 """Three equal masses that chase each other along a figure eight, from the start found by C. Simo."""
 
-from problems.catalogue import _gravity as gravity
+from problems.bodies import gravity
 from problems.checks import Positive
 from problems.entry import Expected, entry
 from problems.picture import Orbits

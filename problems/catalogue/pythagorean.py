@@ -1,6 +1,6 @@
 """The Pythagorean three-body problem."""
 
-from problems.catalogue import _gravity as gravity
+from problems.bodies import gravity
 from problems.entry import Expected, entry
 from problems.picture import Orbits
 from problems.problem import Problem

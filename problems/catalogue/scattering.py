@@ -2,7 +2,7 @@
 
 from itertools import chain
 
-from problems.catalogue import _gravity as gravity
+from problems.bodies import gravity
 from problems.catalogue._starts import nearest
 from problems.checks import Positive
 from problems.entry import Expected, entry

@@ -7,7 +7,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from problems.bodies import masses_of, rows_of
+from problems.bodies.nbody import masses_of, rows_of
 from problems.checks import at_least, checked_arguments
 from problems.errors import InputError, shown
 
@@ -67,7 +67,7 @@ def contacts(radii: ArrayLike, massless: Annotated[int, at_least(0)] = 0) -> lis
     --------
     >>> from integrators import Event, HBVM, start
     >>> from problems import nbody
-    >>> from problems.mergers import contacts
+    >>> from problems.bodies import contacts
     >>> bodies = nbody([1.0, 1.0], [[-1, 0, 0], [1, 0, 0]], [[0, 0.1, 0], [0, -0.1, 0]], t_end=9.0)
     >>> events = [Event(g, direction=-1, terminal=True) for g in contacts([0.1, 0.1])]
     >>> run = start(bodies, HBVM(), events)
@@ -122,7 +122,7 @@ def merge(masses: ArrayLike, positions: ArrayLike, velocities: ArrayLike, radii:
 
     Examples
     --------
-    >>> from problems.mergers import merge
+    >>> from problems.bodies import merge
     >>> merged = merge([3.0, 1.0], [[0, 0, 0], [0.2, 0, 0]], [[0, 0, 0], [0, 4.0, 0]], [0.1, 0.1])
     >>> merged.masses.tolist(), merged.positions.tolist(), merged.velocities.tolist()
     ([4.0], [[0.05, 0.0, 0.0]], [[0.0, 1.0, 0.0]])

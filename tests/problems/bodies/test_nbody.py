@@ -199,7 +199,7 @@ def test_what_are_no_bodies(change, words):
 
 
 def test_the_examples_of_the_page_are_true():
-    page = Path(__file__).parents[2] / "docs" / "howto" / "bodies.md"
+    page = Path(__file__).parents[3] / "docs" / "howto" / "bodies.md"
     failed, tried = doctest.testfile(str(page), module_relative=False)
     assert (failed, tried > 20) == (0, True)
 

@@ -5,8 +5,7 @@ import pytest
 
 from integrators import HBVM, Event, Status, integrate, start
 from problems import InputError, nbody
-from problems.bodies import bodies_of
-from problems.mergers import contacts, merge
+from problems.bodies import bodies_of, contacts, merge
 
 MASSES = [1.0, 3e-4, 1e-4, 2e-4]
 POSITIONS = [[0, 0, 0], [1, 0, 0], [1.05, 0, 0.001], [0, 1.8, 0]]

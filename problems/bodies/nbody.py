@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from problems import emit
-from problems.catalogue import _gravity as gravity
+from problems.bodies import gravity
 from problems.checks import CheckedOptions, Positive, at_least, checked_arguments
 from problems.errors import InputError, shown
 from problems.problem import Problem, check_is_problem
