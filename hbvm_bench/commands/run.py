@@ -74,7 +74,8 @@ def run(
 ) -> None:
     """Run a campaign, or the given problems and methods; a second run computes only what is missing.
 
-    Exit code 0 when every case has a row, 1 when an executor lost some, 130 for Ctrl-C.
+    Exit code 0 when every case has a row, 1 when an executor lost one or its process died three times,
+    130 for Ctrl-C.
     """
     campaign = _campaign(name, problem, method, step, reference)
     campaign = quick_run(campaign) if quick else campaign
@@ -94,6 +95,18 @@ def run(
         from hbvm_bench.commands.publishing import report_on
 
         report_on([store], report_to, stderr=False)
+    refuse_died(store)
+
+
+def refuse_died(store: Store) -> None:
+    """End with the exit code for an unfinished run where the processes of some of its cases died."""
+    dead = [record.case for record in store.records() if loop.died(record)]
+    if not dead:
+        return
+    count = "the process of 1 case" if len(dead) == 1 else f"the processes of {len(dead)} cases"
+    first = f"{dead[0].method} on {dead[0].problem}"
+    _say(f"{count} died {loop.ATTEMPTS} times ({first}{', ...' * (len(dead) > 1)}); run again to try again.")
+    raise typer.Exit(UNFINISHED)
 
 
 def opened(campaign: Campaign, name: str | None) -> Campaign:

@@ -14,7 +14,7 @@ from hbvm_bench.campaign.identity import resolve
 from hbvm_bench.campaign.shorter import chosen, quick_run, with_rounds
 from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.commands.listing import as_json as run_as_json
-from hbvm_bench.commands.run import as_typed, carry_out
+from hbvm_bench.commands.run import as_typed, carry_out, refuse_died
 from hbvm_bench.measure import machine
 from hbvm_bench.report import terminal
 from hbvm_bench.store.files import ensure_writable, write_json
@@ -84,6 +84,7 @@ def race(
             terminal.print_table(table)
     for said in machine.sentences(race.machine for race in shown):
         terminal.console().print(said, highlight=False)
+    refuse_died(store)
 
 
 def race_as_data(races: "Sequence[Race]") -> dict[str, Any]:
@@ -186,6 +187,7 @@ def endure(
         for table in endurance.tables(result):
             terminal.print_table(table)
         terminal.console().print(machine.sentence(result.run.machine), highlight=False)
+    refuse_died(store)
 
 
 def automatic(
@@ -217,3 +219,4 @@ def automatic(
     run = report_on([store], out or directory / REPORT).runs[-1]
     terminal.print_table(automatic.sides(automatic.head_to_heads(run)))
     terminal.console().print(machine.sentence(run.machine), highlight=False)
+    refuse_died(store)

@@ -9,11 +9,11 @@ from hbvm_bench.campaign.file import Campaign, Limits
 from hbvm_bench.campaign.identity import Resolved, resolve
 from hbvm_bench.run.executors import Pool
 from hbvm_bench.run.task import InterruptedRunError, UnfinishedRunError, execute, task_of
-from hbvm_bench.store.records import COMPILING, Record, decoded
+from hbvm_bench.store.records import COMPILING, DIED, Record, decoded
 from hbvm_bench.store.store import Store, damage, is_of
 from problems.errors import InputError
 
-ATTEMPTS = 2  # an executor may lose a case once, with the machine that had it
+ATTEMPTS = 3  # of a case whose process dies, or that an executor loses with the machine that had it
 PATIENCE = 1.0  # seconds between two looks at how many slots there are
 
 
@@ -36,10 +36,15 @@ def plan(campaign: Campaign) -> list[Resolved]:
 
 def is_done(record: Record | None, limits: Limits) -> bool:
     """Whether a stored case need not run again under these limits."""
-    if record is None or record.result.status == COMPILING:
+    if record is None or record.result.status == COMPILING or died(record):
         return False
     stopped_by = {"timeout": "wall_seconds", "killed": "memory_gib"}.get(record.result.outcome)
     return stopped_by is None or getattr(limits, stopped_by) <= getattr(record.limits, stopped_by)
+
+
+def died(record: Record) -> bool:
+    """Whether the process of a case ended without an answer, as when it is killed from outside."""
+    return record.result.status == DIED
 
 
 def is_kept(resolved: Resolved, store: Store, limits: Limits) -> bool:
@@ -62,7 +67,8 @@ def run_accuracy(
     This process alone writes in the store; the executor's may be other machines. The executor has as many
     cases as it has slots, and never a long queue, so that what runs is known, and little is left
     behind where the run is stopped. ``tell`` is called with the running cases, whenever they change
-    and about once a second.
+    and about once a second. A case whose process died runs again, after the others; `ATTEMPTS` times in all,
+    then its record is stored as it is.
 
     Raises
     ------
@@ -92,17 +98,20 @@ def run_accuracy(
             for future in done:
                 resolved = running.pop(future)
                 try:
-                    record = _stored(store, *future.result())
+                    record, series = future.result()
+                    measured = decoded(record, Record)
                 except (InterruptedRunError, InputError, UnfinishedRunError):
                     raise
                 except (Exception, CancelledError) as error:  # of the executor, not of the case
-                    attempts[resolved.id] += 1
-                    if attempts[resolved.id] < ATTEMPTS:
-                        waiting.append(resolved)
-                    else:
-                        failures.append(f"{type(error).__name__}: {error}".rstrip(": "))
-                    continue
-                yield record
+                    failure, measured = f"{type(error).__name__}: {error}".rstrip(": "), None
+                attempts[resolved.id] += 1
+                if (measured is None or died(measured)) and attempts[resolved.id] < ATTEMPTS:
+                    waiting.append(resolved)
+                elif measured is None:
+                    failures.append(failure)
+                else:
+                    store.save(measured, series or None)
+                    yield measured
     finally:
         for future in running:
             future.cancel()
@@ -119,9 +128,3 @@ def _submitted(pool: Pool, task: bytes) -> Future[tuple[bytes, bytes]]:
         raise UnfinishedRunError(
             f"the executor takes no more cases: {type(error).__name__}: {error}"
         ) from None
-
-
-def _stored(store: Store, record: bytes, series: bytes) -> Record:
-    decoded_record = decoded(record, Record)
-    store.save(decoded_record, series or None)
-    return decoded_record

@@ -30,7 +30,7 @@ from hbvm_bench.run import ending, supervise, warm
 from hbvm_bench.run.supervise import Ended
 from hbvm_bench.run.worker import COMPILED, ENVIRONMENT, NO_ROOM, REPLY, STALE, Request
 from hbvm_bench.store import records
-from hbvm_bench.store.records import COMPILING, Outcome, Record, Result
+from hbvm_bench.store.records import COMPILING, DIED, Outcome, Record, Result
 from hbvm_bench.store.store import decode_series
 from problems.errors import InputError
 
@@ -215,27 +215,27 @@ def _difference(versions: dict[str, str], resolved: Resolved) -> str:
 
 
 def _result(scratch: Path, ended: Ended, limits: Limits) -> tuple[Result, bytes]:
-    def failed(outcome: Outcome, reason: str) -> tuple[Result, bytes]:
-        return Result(outcome=outcome, reason=reason), b""
+    def failed(outcome: Outcome, reason: str, status: str = "") -> tuple[Result, bytes]:
+        return Result(outcome=outcome, reason=reason, status=status), b""
 
     if ended.cause == "timeout":
         return failed("timeout", f"did not end within {limits.wall_seconds:g} s")
     if ended.cause == "compiling":
         reason = f"was still compiling after {limits.compile_seconds:g} s; it is tried again in the next run"
-        return Result(outcome="timeout", status=COMPILING, reason=reason), b""
+        return failed("timeout", reason, COMPILING)
     if ended.cause == "memory":
         return failed("killed", f"used more than {limits.memory_gib:g} GiB of memory")
     if ended.code == ending.KILLED:
-        return failed("killed", "ended by signal SIGKILL from outside, perhaps for want of memory")
+        return failed("killed", "ended by signal SIGKILL from outside, perhaps for want of memory", DIED)
     if ended.code != 0:
-        return failed("crashed", f"the process {ended.words}")
+        return failed("crashed", f"the process {ended.words}", DIED)
     result = decoded(scratch / REPLY, Result)
     if result is None:
-        return failed("crashed", NO_RESULT)
+        return failed("crashed", NO_RESULT, DIED)
     if result.outcome not in ("ok", "stalled"):
         return result, b""
     try:
         series = (scratch / "series.npz").read_bytes()
     except FileNotFoundError:
-        return failed("crashed", NO_RESULT)
-    return (result, series) if decode_series(series) else failed("crashed", NO_RESULT)
+        return failed("crashed", NO_RESULT, DIED)
+    return (result, series) if decode_series(series) else failed("crashed", NO_RESULT, DIED)

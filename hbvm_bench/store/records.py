@@ -18,7 +18,8 @@ from problems.errors import printable
 
 T = TypeVar("T")
 SCHEMA = 2  # 1 had position errors in units of length
-COMPILING = "compiling"
+COMPILING = "compiling"  # the status of a timeout before a case began
+DIED = "died"  # the status of a case whose process ended without an answer: it says nothing final of the case
 
 Outcome = Literal["ok", "stalled", "timeout", "killed", "crashed", "refused", "damaged", "outdated"]
 
@@ -265,7 +266,7 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
         ``ok``, ``stalled``, ``refused`` or ``crashed``; ``timeout`` and ``killed`` are seen from
         outside, and ``damaged`` or ``outdated`` is said of a record that the store cannot use.
     status : str
-        The solution's own status; empty without a solution, `COMPILING` for a timeout before it began.
+        The solution's own status; empty without a solution, but for `COMPILING` and `DIED`.
     reason : str
         One sentence where something did not go as asked.
     t_stop : float or None

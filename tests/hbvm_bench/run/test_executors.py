@@ -224,7 +224,7 @@ class Losing(ThreadPoolExecutor):
         return future
 
 
-def test_a_case_that_an_executor_loses_is_tried_twice_and_named_after_all_others(toys, tmp_path):
+def test_a_case_that_an_executor_loses_is_tried_three_times_and_named_after_all_others(toys, tmp_path):
     chosen = cases(2)
     store = store_in(tmp_path / "run")
     with Losing(1) as executor:
@@ -232,7 +232,36 @@ def test_a_case_that_an_executor_loses_is_tried_twice_and_named_after_all_others
         assert next(records).id == chosen[0].id
         with pytest.raises(UnfinishedRunError, match="1 case could not be run: OSError: the machine"):
             next(records)
-        assert executor.lost == 2
+        assert executor.lost == 3
+
+
+@pytest.mark.parametrize(
+    ("deaths", "number"), [(1, signal.SIGKILL), (2, signal.SIGSEGV), (2, signal.SIGKILL)]
+)
+def test_a_case_whose_process_dies_runs_again(toys, tmp_path, deaths, number):
+    counted = tmp_path / "runs"
+    method = f"Crashing(number={int(number)}, counted={str(counted)!r}, times={deaths})"
+    (case,) = [resolve(Case(problem=SHORT, method=method))]
+    (record,) = run_on("local", [case], store_in(tmp_path / "run"))
+    assert record.result.outcome == "ok"
+    assert counted.stat().st_size == deaths + 1
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSEGV])
+def test_a_case_whose_process_died_three_times_is_told_by_the_exit_code_and_runs_again(
+    toys, tmp_path, capsys, number
+):
+    counted = tmp_path / "runs"
+    method = f"Crashing(number={int(number)}, counted={str(counted)!r}, times=3)"
+    command = ["run", "-p", SHORT, "-m", method, "-m", "Waving(h=1.0)", "--no-timing", "--jobs", "1"]
+    command += ["--out", str(tmp_path / "run"), "--report", str(tmp_path / "report")]
+    assert cli.main(command) == 1
+    assert "the process of 1 case died 3 times (Crashing(" in capsys.readouterr().err
+    assert counted.stat().st_size == 3
+    assert (tmp_path / "report" / "report.md").exists()
+    assert cli.main(command) == 0
+    assert "measuring on this machine: 2, 1 already there" in capsys.readouterr().err
+    assert counted.stat().st_size == 4
 
 
 def test_threads_of_this_machine_keep_their_cases_on_cores_of_their_own(toys, tmp_path):
