@@ -1,12 +1,14 @@
 """Traced expressions as LaTeX, as the user wrote them; indices count from 1."""
 
 import re
+from collections.abc import Sequence
 
 from problems.calculus.function import Function
 from problems.errors import InputError
 from problems.systems.base import System
+from problems.trace.fold import Fold
 from problems.trace.functions import FUNCTIONS
-from problems.trace.graph import Affine, Loop, Node, reachable
+from problems.trace.graph import Affine, Loop, Node
 
 LONGEST = 20_000  # characters: a formula beyond that is no longer read
 _SUM, _SIGNED, _PRODUCT, _LEAF = 0, 1, 2, 3
@@ -49,59 +51,68 @@ def latex(system: System, function: Function | None = None) -> str:
     return ",\\ ".join(texts)
 
 
-class _Printer:
+class _Printer(Fold[tuple[str, int]]):
+    """The text of nodes, and how tightly it binds."""
+
     def __init__(self, system: System) -> None:
+        super().__init__()
         self.system = system
-        self.known: dict[int, tuple[str, int]] = {}
 
     def text(self, root: Node) -> str:
-        for node in reachable([root]):
-            if node.id not in self.known:
-                text, level = self._node(node)
-                if len(text) > LONGEST:
-                    raise InputError(
-                        f"the formula of {self.system.name} is longer than {LONGEST} characters."
-                    )
-                self.known[node.id] = (text, level)
-        return self.known[root.id][0]
+        return self.of(root)[0]
+
+    def visit(self, node: Node, results: Sequence[tuple[str, int]]) -> tuple[str, int]:
+        text, level = super().visit(node, results)
+        if len(text) > LONGEST:
+            raise InputError(f"the formula of {self.system.name} is longer than {LONGEST} characters.")
+        return text, level
 
     def _at(self, node: Node, level: int) -> str:
-        text, binding = self.known[node.id]
-        return text if binding >= level else f"\\left({text}\\right)"
+        return _bound(self.known[node.id], level)
 
-    def _node(self, node: Node) -> tuple[str, int]:
-        match node.op:
-            case "const":
-                return _number(node.data)
-            case "symbol":
-                return self._symbol(node), _LEAF
-            case "index":
-                return _index(node.data, 0), _SUM
-            case "add":
-                left, right = (self._at(arg, _SUM) for arg in node.args)
-                return (f"{left} - {right[1:]}" if right.startswith("-") else f"{left} + {right}"), _SUM
-            case "sub":
-                return f"{self._at(node.args[0], _SUM)} - {self._at(node.args[1], _PRODUCT)}", _SUM
-            case "neg":
-                return f"-{self._at(node.args[0], _PRODUCT)}", _SIGNED
-            case "mul":
-                return self._product(node)
-            case "div":
-                return f"\\frac{{{self._at(node.args[0], _SUM)}}}{{{self._at(node.args[1], _SUM)}}}", _PRODUCT
-            case "pow":
-                return f"{self._power(node.args[0], node.data)}", _PRODUCT
-            case "sum":
-                return f"{_range(node.data)} {self._at(node.args[0], _PRODUCT)}", _PRODUCT
-            case "where":
-                condition, a, b = (self._at(arg, _SUM) for arg in node.args)
-                pieces = f"{a} & {condition} > 0 \\\\ {b} & \\text{{else}}"
-                return f"\\begin{{cases}} {pieces} \\end{{cases}}", _LEAF
-            case "table":
-                return f"\\operatorname{{table}}\\left({self._at(node.args[0], _SUM)}\\right)", _LEAF
-            case _:
-                form = FUNCTIONS[node.op].latex
-                inside = tuple(self._at(arg, _SUM) for arg in node.args)
-                return form % inside, _PRODUCT if "^" in form else _LEAF
+    def visit_const(self, node: Node) -> tuple[str, int]:
+        return _number(node.data)
+
+    def visit_symbol(self, node: Node) -> tuple[str, int]:
+        return self._symbol(node), _LEAF
+
+    def visit_index(self, node: Node) -> tuple[str, int]:
+        return _index(node.data, 0), _SUM
+
+    def visit_add(self, node: Node, *args: tuple[str, int]) -> tuple[str, int]:
+        left, right = (_bound(arg, _SUM) for arg in args)
+        return (f"{left} - {right[1:]}" if right.startswith("-") else f"{left} + {right}"), _SUM
+
+    def visit_sub(self, node: Node, a: tuple[str, int], b: tuple[str, int]) -> tuple[str, int]:
+        return f"{_bound(a, _SUM)} - {_bound(b, _PRODUCT)}", _SUM
+
+    def visit_neg(self, node: Node, a: tuple[str, int]) -> tuple[str, int]:
+        return f"-{_bound(a, _PRODUCT)}", _SIGNED
+
+    def visit_mul(self, node: Node, *_: tuple[str, int]) -> tuple[str, int]:
+        return self._product(node)
+
+    def visit_div(self, node: Node, *args: tuple[str, int]) -> tuple[str, int]:
+        above, below = (_bound(arg, _SUM) for arg in args)
+        return f"\\frac{{{above}}}{{{below}}}", _PRODUCT
+
+    def visit_pow(self, node: Node, *_: tuple[str, int]) -> tuple[str, int]:
+        return self._power(node.args[0], node.data), _PRODUCT
+
+    def visit_sum(self, node: Node, body: tuple[str, int]) -> tuple[str, int]:
+        return f"{_range(node.data)} {_bound(body, _PRODUCT)}", _PRODUCT
+
+    def visit_where(self, node: Node, *args: tuple[str, int]) -> tuple[str, int]:
+        condition, a, b = (_bound(arg, _SUM) for arg in args)
+        pieces = f"{a} & {condition} > 0 \\\\ {b} & \\text{{else}}"
+        return f"\\begin{{cases}} {pieces} \\end{{cases}}", _LEAF
+
+    def visit_table(self, node: Node, x: tuple[str, int]) -> tuple[str, int]:
+        return f"\\operatorname{{table}}\\left({_bound(x, _SUM)}\\right)", _LEAF
+
+    def visit_operation(self, node: Node, *args: tuple[str, int]) -> tuple[str, int]:
+        form = FUNCTIONS[node.op].latex
+        return form % tuple(_bound(arg, _SUM) for arg in args), _PRODUCT if "^" in form else _LEAF
 
     def _power(self, base: Node, exponent: int) -> str:
         text, binding = self.known[base.id]
@@ -165,6 +176,12 @@ class _Printer:
                 return _word(name, index)
             offset += size or 1
         raise AssertionError(f"no parameter at {low}")
+
+
+def _bound(result: tuple[str, int], level: int) -> str:
+    """Return a text, in parentheses if it binds less tightly than ``level``."""
+    text, binding = result
+    return text if binding >= level else f"\\left({text}\\right)"
 
 
 def _factors(node: Node) -> list[Node]:

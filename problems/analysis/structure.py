@@ -5,6 +5,7 @@ from numpy.typing import ArrayLike
 
 from problems.errors import InputError
 from problems.systems.base import System
+from problems.trace.fold import Fold
 from problems.trace.functions import FUNCTIONS
 from problems.trace.graph import STATE, Node, T, reachable
 
@@ -33,47 +34,53 @@ def degree(system: System, par: ArrayLike | None = None) -> int | None:
         If the system has no energy.
     """
     values = None if par is None else np.asarray(par, dtype=np.float64).tolist()
-    known: dict[int, float | None] = {}
-    root = _energy(system)
-    for node in reachable([root]):
-        known[node.id] = _degree(node, known, values)
-    total = known[root.id]
+    total = _Degree(values).of(_energy(system))
     return None if total is None else int(max(total, 0))
 
 
 _ZERO = float("-inf")  # the degree of the polynomial 0
 
 
-def _degree(node: Node, known: dict[int, float | None], par: list[float] | None) -> float | None:
-    if node.op == "const":
+class _Degree(Fold[float | None]):
+    """The degree of nodes as polynomials in the state."""
+
+    def __init__(self, par: list[float] | None):
+        super().__init__()
+        self._par = par
+
+    def visit_const(self, node: Node) -> float:
         return _ZERO if node.data == 0.0 else 0
-    if node.op == "symbol":
+
+    def visit_symbol(self, node: Node) -> float:
         space, place = node.data
         if space == "y":
             return 1
-        absent = space == "par" and par is not None and isinstance(place, int) and par[place] == 0.0
+        absent = space == "par" and self._par is not None and isinstance(place, int) and not self._par[place]
         return _ZERO if absent else 0
-    if node.op == "index":
-        return 0
-    degrees = [known[arg.id] for arg in node.args]
-    a = degrees[0]
-    if node.op == "mul" and _ZERO in degrees:
-        return _ZERO
-    if any(d is None for d in degrees):
-        return None
-    match node.op:
-        case "add" | "sub":
-            return max(d for d in degrees if d is not None)
-        case "mul":
-            return sum(d for d in degrees if d is not None)
-        case "div":
-            return a if not node.args[1].flags & STATE else None
-        case "neg" | "sum":
-            return a
-        case "pow":
-            return None if a is None else a * node.data
-        case _:
-            return 0 if not node.flags & STATE else None
+
+    def visit_add(self, node: Node, a: float | None, b: float | None) -> float | None:
+        return None if a is None or b is None else max(a, b)
+
+    visit_sub = visit_add
+
+    def visit_mul(self, node: Node, a: float | None, b: float | None) -> float | None:
+        if _ZERO in (a, b):
+            return _ZERO
+        return None if a is None or b is None else a + b
+
+    def visit_div(self, node: Node, a: float | None, b: float | None) -> float | None:
+        return a if b is not None and not node.args[1].flags & STATE else None
+
+    def visit_neg(self, node: Node, a: float | None) -> float | None:
+        return a
+
+    visit_sum = visit_neg
+
+    def visit_pow(self, node: Node, a: float | None) -> float | None:
+        return None if a is None else a * node.data
+
+    def visit_operation(self, node: Node, *degrees: float | None) -> float | None:
+        return 0 if None not in degrees and not node.flags & STATE else None
 
 
 def depends_on_time(system: System) -> bool:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from problems.analysis.structure import has_kink
 from problems.systems.base import System
+from problems.trace.fold import Fold
 from problems.trace.functions import FUNCTIONS
 from problems.trace.graph import PAR, STATE, Affine, Node, T, reachable
 
@@ -62,7 +63,7 @@ class Switches:
         return self._solved(par) if self._fixed is None else self._fixed
 
     def _solved(self, par: NDArray[np.float64]) -> NDArray[np.float64]:
-        pieces = _Evaluation(par).pieces
+        pieces = _Evaluation(par).of
         crossings = [np.empty(0)]
         for node in self._nodes:
             levels = np.array(node.data.knots if node.op == "table" else [0.0])
@@ -74,56 +75,50 @@ class Switches:
         return np.unique(times[np.isfinite(times)]) + 0.0  # no negative zero
 
 
-class _Evaluation:
-    """The affine pieces of nodes, with given parameters."""
+class _Evaluation(Fold[Pieces | None]):
+    """The affine pieces of nodes, with given parameters; ``None`` where they are not made of a few."""
 
     def __init__(self, par: NDArray[np.float64]):
+        super().__init__()
         self._par = par
-        self._known: dict[int, Pieces | None] = {}
 
-    def pieces(self, node: Node) -> Pieces | None:
-        """Return a node's affine pieces; ``None`` where it is not made of a few."""
-        for inner in reachable([node]):
-            if inner.id not in self._known:
-                self._known[inner.id] = self._pieces(inner)
-        return self._known[node.id]
-
-    def _pieces(self, node: Node) -> Pieces | None:
+    def visit(self, node: Node, results: Sequence[Pieces | None]) -> Pieces | None:
         with np.errstate(all="ignore"):
-            if not node.args:
-                return [self._leaf(node)]
-            args = [self._known[arg.id] for arg in node.args]
-            if node.op == "where":
-                return self._chosen(node, args)
-            combined = []
-            for chosen in product(*(arg or () for arg in args)):
-                applied = _applied(node, chosen)
-                if applied is None:
-                    return None
-                combined += applied
-            return combined if 0 < len(combined) <= MOST_PIECES else None
+            return super().visit(node, results)
 
-    def _leaf(self, node: Node) -> tuple[Any, Any]:
-        if node.op == "const":
-            return 0.0, node.data
-        if node.op == "index":
-            assert node.loop is not None
-            return 0.0, node.data.values(node.loop).astype(np.float64)
+    def visit_const(self, node: Node) -> Pieces:
+        return [(0.0, node.data)]
+
+    def visit_index(self, node: Node) -> Pieces:
+        assert node.loop is not None
+        return [(0.0, node.data.values(node.loop).astype(np.float64))]
+
+    def visit_symbol(self, node: Node) -> Pieces:
         space, place = node.data
         if space == "t":
-            return 1.0, 0.0
+            return [(1.0, 0.0)]
         if isinstance(place, Affine):
             assert node.loop is not None
-            return 0.0, self._par[place.values(node.loop)]
-        return 0.0, float(self._par[place])
+            return [(0.0, self._par[place.values(node.loop)])]
+        return [(0.0, float(self._par[place]))]
 
-    def _chosen(self, node: Node, args: Sequence[Pieces | None]) -> Pieces | None:
-        condition, a, b = args
+    def visit_where(
+        self, node: Node, condition: Pieces | None, a: Pieces | None, b: Pieces | None
+    ) -> Pieces | None:
         if a is None or b is None:
             return None
         if node.args[0].flags & T == 0 and condition is not None and np.ndim(condition[0][1]) == 0:
             return a if condition[0][1] > 0.0 else b
         return a + b if len(a) + len(b) <= MOST_PIECES else None
+
+    def visit_operation(self, node: Node, *args: Pieces | None) -> Pieces | None:
+        combined = []
+        for chosen in product(*(arg or () for arg in args)):
+            applied = _applied(node, chosen)
+            if applied is None:
+                return None
+            combined += applied
+        return combined if 0 < len(combined) <= MOST_PIECES else None
 
 
 def _applied(node: Node, args: Sequence[tuple[Any, Any]]) -> Pieces | None:

@@ -9,11 +9,12 @@ times that of ``f`` for each direction, whatever the number of variables, and wh
 such as the root of a distance, is computed once.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from problems.calculus.function import Function, LoopTerm, Term
+from problems.trace.fold import Copy, Fold, shifted
 from problems.trace.functions import FUNCTIONS, Slope
-from problems.trace.graph import PAR, STATE, Affine, Graph, Loop, Node, reachable
+from problems.trace.graph import PAR, STATE, Graph, Loop, Node
 
 
 def forward(
@@ -54,130 +55,139 @@ def forward(
     >>> emit.numpy(pendulum, along)(0.0, np.array([1.0, 0.0, 0.5, 0.0]), pendulum.pack()).round(3).tolist()
     [0.0, -0.878]
     """
-    rule = Rule(Graph(function.graph.dof), size, directions, parameters)
+    values = _Behind(Graph(function.graph.dof), size * directions)
+    along = [_Tangent(values, size, parameters, direction) for direction in range(directions)]
     outputs = len(function.outputs)
     products: list[tuple[Term, ...]] = [()] * (outputs * directions)
     for i, terms in enumerate(function.outputs):
-        for direction in range(directions):
+        for direction, slopes in enumerate(along):
             products[outputs * direction + i] = tuple(
-                Term(node, term.key)
-                for term in terms
-                if (node := rule.slope(term.node, direction)) is not None
+                Term(node, term.key) for term in terms if (node := slopes.of(term.node)) is not None
             )
     if beside:
         products += [
-            tuple(Term(rule.value(term.node), term.key) for term in terms) for terms in function.outputs
+            tuple(Term(values.of(term.node), term.key) for term in terms) for terms in function.outputs
         ]
     loops: list[tuple[Loop, tuple[LoopTerm, ...]]] = []
     for loop, entries in function.loops:
         moved: list[LoopTerm] = []
-        for direction in range(directions):
+        for direction, slopes in enumerate(along):
             for entry in entries:
-                node = rule.slope(entry.node, direction)
+                node = slopes.of(entry.node)
                 if node is not None:
                     moved.append(LoopTerm(entry.index.shifted(outputs * direction), node))
         if beside:
             moved += [
-                LoopTerm(entry.index.shifted(outputs * directions), rule.value(entry.node))
+                LoopTerm(entry.index.shifted(outputs * directions), values.of(entry.node))
                 for entry in entries
             ]
         if moved:
-            loops.append((rule.graph.loop(loop.rows), tuple(moved)))
-    return Function(rule.graph, tuple(products), tuple(loops), name)
+            loops.append((values.graph.loop(loop.rows), tuple(moved)))
+    return Function(values.graph, tuple(products), tuple(loops), name)
 
 
-class Rule:
-    """The values of nodes where the state comes behind the directions, and their derivatives."""
+class _Behind(Copy):
+    """Nodes where the state comes behind the directions."""
 
-    def __init__(self, graph: Graph, size: int, directions: int, parameters: int | None):
-        self.graph, self.size, self.directions, self.parameters = graph, size, directions, parameters
-        self.active = STATE | (0 if parameters is None else PAR)
-        self.values: dict[int, Node] = {}
-        self.slopes: dict[tuple[int, int], Node | None] = {}
+    def __init__(self, graph: Graph, shift: int):
+        super().__init__(graph)
+        self._shift = shift
 
-    def value(self, root: Node) -> Node:
-        """Return a node in terms of the new arguments."""
-        for node in reachable([root]):
-            if node.id not in self.values:
-                self.values[node.id] = self._value(node)
-        return self.values[root.id]
+    def visit_symbol(self, node: Node) -> Node:
+        return self.moved(node, self._shift if node.data[0] == "y" else 0)
 
-    def _value(self, node: Node) -> Node:
-        graph = self.graph
-        match node.op:
-            case "const":
-                return graph.const(node.data)
-            case "symbol":
-                return self._symbol(node, self.size * self.directions if node.data[0] == "y" else 0)
-            case "index":
-                assert node.loop is not None
-                return graph.index(node.data, graph.loop(node.loop.rows))
-            case "sum":
-                return graph.sum(self.values[node.args[0].id], graph.loop(node.data.rows))
-        return graph.apply(node, tuple(self.values[arg.id] for arg in node.args))
-
-    def slope(self, root: Node, direction: int) -> Node | None:
-        """Return the derivative of a node along a direction; ``None`` where it is 0."""
-        self.value(root)
-        for node in reachable([root]):
-            if (node.id, direction) not in self.slopes:
-                self.slopes[node.id, direction] = self._slope(node, direction)
-        return self.slopes[root.id, direction]
-
-    def _symbol(self, node: Node, shift: int) -> Node:
+    def moved(self, node: Node, shift: int) -> Node:
         """Return a symbol whose place is moved."""
         space, place = node.data
-        if shift:
-            place = place.shifted(shift) if isinstance(place, Affine) else place + shift
-        loop = None if node.loop is None else self.graph.loop(node.loop.rows)
-        return self.graph.symbol(space, place, flags=node.flags, loop=loop)
+        return self.graph.symbol(space, shifted(place, shift), flags=node.flags, loop=self.loop(node.loop))
 
-    def _slope(self, node: Node, direction: int) -> Node | None:
-        if not node.flags & self.active or node.op in ("const", "index"):
+
+class Slopes(Fold[Node | None]):
+    """The derivatives of nodes along one direction; ``None`` where they are 0.
+
+    Parameters
+    ----------
+    values : Copy
+        The nodes in terms of the new arguments.
+    active : int
+        Flags of what varies.
+    """
+
+    def __init__(self, values: Copy, active: int):
+        super().__init__()
+        self.values, self.graph, self.active = values, values.graph, active
+
+    def of(self, root: Node) -> Node | None:
+        self.values.of(root)
+        return super().of(root)
+
+    def at(self, node: Node) -> Node:
+        """Return the value of a node."""
+        return self.values.known[node.id]
+
+    def visit(self, node: Node, results: Sequence[Node | None]) -> Node | None:
+        return super().visit(node, results) if node.flags & self.active else None
+
+    def visit_add(self, node: Node, a: Node | None, b: Node | None) -> Node | None:
+        return _joined(self.graph.add, a, b)
+
+    def visit_sub(self, node: Node, a: Node | None, b: Node | None) -> Node | None:
+        return a if b is None else _joined(self.graph.sub, a, b, self.graph.neg)
+
+    def visit_neg(self, node: Node, a: Node | None) -> Node | None:
+        return None if a is None else self.graph.neg(a)
+
+    def visit_mul(self, node: Node, a: Node | None, b: Node | None) -> Node | None:
+        x, y = node.args
+        if x is y:
+            return None if a is None else 2.0 * self.at(x) * a
+        left = None if a is None else a * self.at(y)
+        right = None if b is None else self.at(x) * b
+        return _joined(self.graph.add, left, right)
+
+    def visit_div(self, node: Node, a: Node | None, b: Node | None) -> Node | None:
+        below = None if b is None else self.at(node) * b
+        top = a if below is None else _joined(self.graph.sub, a, below, self.graph.neg)
+        return None if top is None else top / self.at(node.args[1])
+
+    def visit_pow(self, node: Node, a: Node | None) -> Node | None:
+        n = node.data
+        return None if a is None else (n * self.graph.int_power(self.at(node.args[0]), n - 1)) * a
+
+    def visit_where(self, node: Node, condition: Node | None, a: Node | None, b: Node | None) -> Node | None:
+        if a is None and b is None:
             return None
-        graph, along = self.graph, [self.slopes[arg.id, direction] for arg in node.args]
-        at = [self.values[arg.id] for arg in node.args]
-        match node.op:
-            case "symbol":
-                if node.data[0] == "y":
-                    return self._symbol(node, self.size * direction)
-                if node.data[0] == "par" and self.parameters is not None:
-                    return self._symbol(node, self.parameters * (1 + direction))
-                return None
-            case "add":
-                return _joined(graph.add, along[0], along[1])
-            case "sub":
-                return along[0] if along[1] is None else _joined(graph.sub, along[0], along[1], graph.neg)
-            case "neg":
-                return None if along[0] is None else graph.neg(along[0])
-            case "mul" if node.args[0] is node.args[1]:
-                return None if along[0] is None else 2.0 * at[0] * along[0]
-            case "mul":
-                left = None if along[0] is None else along[0] * at[1]
-                right = None if along[1] is None else at[0] * along[1]
-                return _joined(graph.add, left, right)
-            case "div":
-                below = None if along[1] is None else self.values[node.id] * along[1]
-                top = along[0] if below is None else _joined(graph.sub, along[0], below, graph.neg)
-                return None if top is None else top / at[1]
-            case "pow":
-                n = node.data
-                return None if along[0] is None else (n * graph.int_power(at[0], n - 1)) * along[0]
-            case "where":
-                if along[1] is None and along[2] is None:
-                    return None
-                zero = graph.const(0.0)
-                return graph.where(at[0], *(zero if part is None else part for part in along[1:]))
-            case "sum":
-                return None if along[0] is None else graph.sum(along[0], graph.loop(node.data.rows))
-            case "table":
-                return None if along[0] is None else graph.table(at[0], node.data.slope()) * along[0]
+        zero = self.graph.const(0.0)
+        return self.graph.where(self.at(node.args[0]), *(zero if part is None else part for part in (a, b)))
+
+    def visit_sum(self, node: Node, body: Node | None) -> Node | None:
+        return None if body is None else self.graph.sum(body, self.graph.loop(node.data.rows))
+
+    def visit_table(self, node: Node, a: Node | None) -> Node | None:
+        return None if a is None else self.graph.table(self.at(node.args[0]), node.data.slope()) * a
+
+    def visit_operation(self, node: Node, *results: Node | None) -> Node | None:
         total = None
-        slopes = FUNCTIONS[node.op].slopes(self.values[node.id])
-        for slope, part in zip(slopes, along, strict=True):
+        slopes = FUNCTIONS[node.op].slopes(self.at(node))
+        for slope, part in zip(slopes, results, strict=True):
             if part is not None and slope.factor != 0:
-                total = _joined(graph.add, total, _times(slope, part))
+                total = _joined(self.graph.add, total, _times(slope, part))
         return total
+
+
+class _Tangent(Slopes):
+    """Derivatives along one of the directions that stand before the state, and behind the parameters."""
+
+    def __init__(self, values: _Behind, size: int, parameters: int | None, direction: int):
+        super().__init__(values, STATE | (0 if parameters is None else PAR))
+        self._behind = values
+        self._shifts = {"y": size * direction}
+        if parameters is not None:
+            self._shifts["par"] = parameters * (1 + direction)
+
+    def visit_symbol(self, node: Node) -> Node | None:
+        shift = self._shifts.get(node.data[0])
+        return None if shift is None else self._behind.moved(node, shift)
 
 
 def _joined(

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from problems.calculus.function import Function, LoopTerm, Term
 from problems.calculus.gradient import gradient
+from problems.trace.fold import Copy
 from problems.trace.graph import STATE, Affine, Graph, Loop, Node, Q, reachable
 
 Integers = NDArray[np.int64]
@@ -195,16 +196,31 @@ def _widened(affine: Affine, loop: Loop, at: int) -> Affine:
     return Affine(tuple(coefficients), affine.offset)
 
 
+class _Replaced(Copy):
+    """A node of a loop whose symbols, and what comes from outside, are replaced by ``leaf``."""
+
+    def __init__(self, graph: Graph, loop: Loop, leaf: Callable[[Node], Node]):
+        super().__init__(graph)
+        self._loop, self._leaf = loop, leaf
+
+    def of(self, root: Node) -> Node:
+        for node in reachable([root], self._loop):
+            results = [self._of_argument(arg) for arg in node.args]
+            self.known[node.id] = self.visit(node, results)
+        return self._of_argument(root)
+
+    def _of_argument(self, node: Node) -> Node:
+        return self.known[node.id] if node.id in self.known else self._leaf(node)
+
+    def visit_symbol(self, node: Node) -> Node:
+        return self._leaf(node)
+
+    visit_index = visit_symbol
+
+
 def _copied(graph: Graph, root: Node, loop: Loop, leaf: Callable[[Node], Node]) -> Node:
     """Return ``root`` with ``leaf`` applied to the loop's symbols and to what comes from outside."""
-    done: dict[int, Node] = {}
-    for node in reachable([root], loop):
-        if node.op in ("symbol", "index"):
-            done[node.id] = leaf(node)
-        else:
-            args = tuple(done[arg.id] if arg.id in done else leaf(arg) for arg in node.args)
-            done[node.id] = graph.apply(node, args)
-    return done[root.id] if root.id in done else leaf(root)
+    return _Replaced(graph, loop, leaf).of(root)
 
 
 def _moved(graph: Graph, root: Node, loop: Loop, to: Loop, at: int) -> Node:

@@ -12,7 +12,8 @@ from typing import Literal
 
 from problems.calculus.function import Function
 from problems.calculus.gradient import gradient
-from problems.trace.graph import PAR, Affine, Graph, Loop, Node, Q, T, reachable
+from problems.trace.fold import Copy, shifted
+from problems.trace.graph import PAR, Graph, Node, Q, T
 
 Variables = Literal["state", "parameters"]
 
@@ -47,58 +48,32 @@ def reverse(function: Function, *, variables: Variables, count: int, name: str) 
     [-1.755, 1.0]
     """
     weights = len(function.outputs)
-    copy = _Copy(Graph(function.graph.dof), weights, variables)
+    copy = _Weighted(Graph(function.graph.dof), weights, variables)
     graph = copy.graph
     total = graph.const(0.0)
     for loop, entries in function.loops:
         inside = graph.loop(loop.rows)
         for entry in entries:
             weight = graph.symbol("y", entry.index, flags=PAR, loop=inside)
-            total = total + graph.sum(weight * copy.of_node(entry.node), inside)
+            total = total + graph.sum(weight * copy.of(entry.node), inside)
     for i, terms in enumerate(function.outputs):
         for term in terms:
-            total = total + graph.symbol("y", i, flags=PAR) * copy.of_node(term.node)
+            total = total + graph.symbol("y", i, flags=PAR) * copy.of(term.node)
     if variables == "state":
         return gradient(total, weights + count).part(weights, weights + count).named(name)
     return gradient(total, count).named(name)
 
 
-class _Copy:
+class _Weighted(Copy):
     """Nodes on a graph where the state comes behind weights, and counts as such if it is to vary."""
 
     def __init__(self, graph: Graph, weights: int, variables: Variables):
-        self.graph, self._weights, self._done = graph, weights, dict[int, Node]()
+        super().__init__(graph)
+        self._weights = weights
         # What a gradient is taken with respect to has the flags of a state.
         self._flags = {"t": T, "y": Q, "par": PAR} if variables == "state" else {"t": T, "y": PAR, "par": Q}
 
-    def of_node(self, root: Node) -> Node:
-        """Return the copy of a node."""
-        for node in reachable([root]):
-            if node.id not in self._done:
-                self._done[node.id] = self._copied(node)
-        return self._done[root.id]
-
-    def _copied(self, node: Node) -> Node:
-        graph = self.graph
-        match node.op:
-            case "const":
-                return graph.const(node.data)
-            case "symbol":
-                return self._symbol(node)
-            case "index":
-                return graph.index(node.data, self._loop(node.loop))
-            case "sum":
-                return graph.sum(self._done[node.args[0].id], self._loop(node.data))
-        return graph.apply(node, tuple(self._done[arg.id] for arg in node.args))
-
-    def _symbol(self, node: Node) -> Node:
+    def visit_symbol(self, node: Node) -> Node:
         space, place = node.data
-        if space == "y":
-            shift = self._weights
-            place = place.shifted(shift) if isinstance(place, Affine) else place + shift
-        loop = None if node.loop is None else self._loop(node.loop)
-        return self.graph.symbol(space, place, flags=self._flags[space], loop=loop)
-
-    def _loop(self, loop: Loop | None) -> Loop:
-        assert loop is not None
-        return self.graph.loop(loop.rows)
+        place = shifted(place, self._weights) if space == "y" else place
+        return self.graph.symbol(space, place, flags=self._flags[space], loop=self.loop(node.loop))

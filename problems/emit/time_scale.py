@@ -9,10 +9,11 @@ not constant:
 with the Frobenius norm and a constant w_0. For Kepler's problem w is of the size of ``r^-3/2``.
 """
 
-from problems.calculus.forward import Rule
+from problems.calculus.forward import Slopes
 from problems.calculus.function import Function, function_of
 from problems.emit.plan import written_out
-from problems.trace.graph import PAR, Node
+from problems.trace.fold import Copy
+from problems.trace.graph import PAR, STATE, Node
 
 
 def time_scale(field: Function, parameters: int) -> Function:
@@ -43,21 +44,24 @@ def time_scale(field: Function, parameters: int) -> Function:
 
 def _along(nodes: list[Node], directions: list[Node]) -> list[Node]:
     """Return the derivatives of nodes along a direction whose components are nodes of the same graph."""
-    rule = _Along(directions)
+    slopes = _Along(directions)
     zero = directions[0].graph.const(0.0)
-    return [zero if (slope := rule.slope(node, 0)) is None else slope for node in nodes]
+    return [zero if (slope := slopes.of(node)) is None else slope for node in nodes]
 
 
-class _Along(Rule):
+class _Same(Copy):
+    def of(self, root: Node) -> Node:
+        return root
+
+
+class _Along(Slopes):
     def __init__(self, directions: list[Node]):
-        super().__init__(directions[0].graph, len(directions), 1, None)
+        super().__init__(_Same(directions[0].graph), STATE)
         self._directions = directions
 
-    def _value(self, node: Node) -> Node:
+    def at(self, node: Node) -> Node:
         return node
 
-    def _slope(self, node: Node, direction: int) -> Node | None:
-        if node.op != "symbol":
-            return super()._slope(node, direction)
+    def visit_symbol(self, node: Node) -> Node | None:
         slope = self._directions[node.data[1]] if node.data[0] == "y" else None
         return None if slope is None or (slope.op == "const" and slope.data == 0.0) else slope

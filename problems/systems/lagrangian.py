@@ -1,6 +1,6 @@
 """Mechanical systems defined by a Lagrangian, from which the momenta and the Hamiltonian are derived."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Annotated, Any
 
@@ -11,7 +11,8 @@ from problems.errors import InputError
 from problems.systems.base import System, Value
 from problems.systems.hamiltonian import Hamiltonian
 from problems.trace import arguments
-from problems.trace.graph import Node, P, reachable
+from problems.trace.fold import Copy
+from problems.trace.graph import Node, P
 from problems.trace.source_line import line_of_function
 
 
@@ -146,18 +147,22 @@ class Lagrangian(Hamiltonian):
 
     def _at_rest(self, root: Node) -> Node:
         """Return a node where all velocities are 0."""
-        graph = self._graph
-        zero = graph.const(0.0)
-        done: dict[int, Node] = {}
-        for node in reachable([root]):
-            if not node.flags & P:
-                done[node.id] = node
-            elif node.op == "symbol":
-                done[node.id] = zero
-            else:
-                args = tuple(done[arg.id] for arg in node.args)
-                vanishes = node.op in ("mul", "div") and (
-                    args[0] is zero or (node.op == "mul" and args[1] is zero)
-                )
-                done[node.id] = zero if vanishes else graph.apply(node, args)
-        return done[root.id]
+        return _AtRest(self._graph).of(root)
+
+
+class _AtRest(Copy):
+    """Nodes where all velocities are 0."""
+
+    def visit(self, node: Node, results: Sequence[Node]) -> Node:
+        return super().visit(node, results) if node.flags & P else node
+
+    def visit_symbol(self, node: Node) -> Node:
+        return self.graph.const(0.0)
+
+    def visit_mul(self, node: Node, a: Node, b: Node) -> Node:
+        zero = self.graph.const(0.0)
+        return zero if a is zero or b is zero else a * b
+
+    def visit_div(self, node: Node, a: Node, b: Node) -> Node:
+        zero = self.graph.const(0.0)
+        return zero if a is zero else a / b
