@@ -1,144 +1,24 @@
 """Quantities along a solution, evaluated in double-double from the double states.
 
-The traced graph is interpreted over arrays of states: constants, parameters and
-states are the doubles that the integrators see, every operation carries 32
-digits, and the result is rounded once. What is left is the integrator's error. Values
-that pairs of doubles cannot hold are computed by `problems.analysis.wide`.
+The result is rounded once, so that what is left is the integrator's error. Values that
+pairs of doubles cannot hold are computed by `problems.evaluate.wide`.
 """
-
-import operator
-from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from problems import double_double
 from problems.calculus.function import Function
-from problems.double_double import DD, as_dd
+from problems.double_double import DD
 from problems.errors import InputError, shown
+from problems.evaluate.pairs import evaluate
 from problems.systems.base import System
 from problems.systems.lagrangian import Lagrangian
-from problems.trace.functions import FUNCTIONS
-from problems.trace.graph import Loop, Node, T, reachable
+from problems.trace.graph import T
 
 Array = NDArray[np.float64]
 
-# Numbers held at once by a declared sum's terms, so that many states and many terms fit in memory.
-_BLOCK = 2_000_000
 _SMALLEST, _LARGEST = 1e-270, 1e290  # sizes between which pairs of doubles have their 32 digits
 _TINY = 1e-60  # a product of four states that are as large is not below the smallest double
-_OPERATIONS: dict[str, Callable[..., DD]] = {name: f.double_double for name, f in FUNCTIONS.items()} | {
-    "add": operator.add,
-    "sub": operator.sub,
-    "mul": operator.mul,
-    "div": operator.truediv,
-    "neg": operator.neg,
-    "where": lambda condition, a, b: double_double.where(condition.rounded() > 0.0, a, b),
-}
-
-
-def evaluate(function: Function, t: ArrayLike, y: Array | DD, par: Array) -> list[DD]:
-    """Evaluate a function in double-double.
-
-    Parameters
-    ----------
-    function : Function
-        From `System.function`.
-    t : array_like
-        One time, or one per state.
-    y : ndarray or DD, shape (dim, n)
-        States, one per column.
-    par : ndarray, shape (n_par,) or (n_par, n)
-        Parameters, of all states or of each.
-
-    Returns
-    -------
-    list of DD
-        One array of shape (n,) per output.
-    """
-    lengths = [len(node.data) for node in reachable(function.roots) if node.op == "sum"]
-    largest = max([1, *lengths, *(len(loop) for loop, _ in function.loops)])
-    columns = max(1, _BLOCK // largest)
-    y = as_dd(y)
-    n = y.hi.shape[1]
-    times = np.broadcast_to(np.asarray(t, dtype=np.float64), (n,))
-    own = par if par.ndim == 2 else par[:, np.newaxis]
-    blocks = [slice(low, low + columns) for low in range(0, max(n, 1), columns)]
-    parts = [
-        _Interpreter(times[here], y[:, here], own[:, here] if par.ndim == 2 else own).outputs(function)
-        for here in blocks
-    ]
-    return [
-        DD(np.concatenate([p[i].hi for p in parts]), np.concatenate([p[i].lo for p in parts]))
-        for i in range(len(function.outputs))
-    ]
-
-
-class _Interpreter:
-    def __init__(self, t: Array, y: DD, par: Array) -> None:
-        self.inputs = {"t": as_dd(t[np.newaxis, :]), "y": y, "par": as_dd(par)}
-        self.n = y.hi.shape[1]
-        self.known: dict[int, DD] = {}
-
-    def outputs(self, function: Function) -> list[DD]:
-        # Overflow and 0/0 at a state that is not finite give nan there, which is the answer.
-        with np.errstate(all="ignore"):
-            for node in reachable(function.roots):
-                if node.loop is None:
-                    self.known[node.id] = self._value(node, self.known)
-            summands: list[list[DD]] = [[] for _ in function.outputs]
-            for loop, entries in function.loops:
-                body = self._inside([entry.node for entry in entries], loop)
-                for entry in entries:
-                    terms = body[entry.node.id] if entry.node.loop is loop else self.known[entry.node.id]
-                    rows = self._rows(terms, len(loop))
-                    for row, place in enumerate(entry.index.values(loop)):
-                        summands[place].append(rows[row])
-            for terms, parts in zip(function.outputs, summands, strict=True):
-                parts.extend(self.known[term.node.id] for term in terms)
-            return [self._total(parts) for parts in summands]
-
-    def _total(self, parts: list[DD]) -> DD:
-        total = sum(parts, start=DD(0.0))
-        return DD(np.broadcast_to(total.hi, (self.n,)), np.broadcast_to(total.lo, (self.n,)))
-
-    def _rows(self, terms: DD, n: int) -> DD:
-        return DD(np.broadcast_to(terms.hi, (n, self.n)), np.broadcast_to(terms.lo, (n, self.n)))
-
-    def _inside(self, roots: list[Node], loop: Loop) -> dict[int, DD]:
-        body: dict[int, DD] = {}
-        for node in reachable(roots, loop):
-            body[node.id] = self._value(node, body)
-        return body
-
-    def _value(self, node: Node, known: dict[int, DD]) -> DD:
-        if node.op == "const":
-            return DD(node.data)
-        if node.op == "symbol":
-            space, place = node.data
-            rows = self.inputs[space]
-            return rows[place if isinstance(place, int) else place.values(node.loop)]
-        if node.op == "index":
-            return DD(node.data.values(node.loop).astype(np.float64)[:, np.newaxis])
-        if node.op == "sum":
-            return self._sum(node, node.data)
-        args = [known[arg.id] if arg.id in known else self.known[arg.id] for arg in node.args]
-        if node.op == "pow":
-            return args[0] ** node.data
-        if node.op == "table":
-            return node.data.at(args[0])
-        return _OPERATIONS[node.op](*args)
-
-    def _sum(self, node: Node, loop: Loop) -> DD:
-        terms = self._rows(self._inside([node.args[0]], loop)[node.args[0].id], len(loop))
-        # In halves: with 32 digits the order does not matter, and this is fast.
-        hi, lo = terms.hi, terms.lo
-        while len(hi) > 1:
-            half = len(hi) // 2
-            paired = DD(hi[:half], lo[:half]) + DD(hi[half : 2 * half], lo[half : 2 * half])
-            hi = np.concatenate([paired.hi, hi[2 * half :]])
-            lo = np.concatenate([paired.lo, lo[2 * half :]])
-        return DD(hi[0], lo[0])
 
 
 def _states(system: System, y: ArrayLike | DD) -> DD:
@@ -188,7 +68,7 @@ def errors(
     system: System, par: Array, y: ArrayLike | DD, t: ArrayLike | None, *, start: tuple[float, Array | DD]
 ) -> dict[str, Array]:
     """Return how far the invariants are from those at ``start``, see `problems.problem.Problem.errors`."""
-    from problems.analysis import wide  # which loads mpmath
+    from problems.evaluate import wide  # which loads mpmath
 
     states, begin = _states(system, y), _states(system, start[1])
     t0, y0 = start[0], begin.hi[0]
@@ -234,7 +114,7 @@ def errors_since(
     -------
     dict of str to ndarray, shape (n,)
     """
-    from problems.analysis import wide  # which loads mpmath
+    from problems.evaluate import wide  # which loads mpmath
 
     t0, y0 = starts
     states, begin = _states(system, y), _states(system, y0)

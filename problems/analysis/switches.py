@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from problems.analysis.structure import has_kink
+from problems.evaluate.doubles import DOUBLES
 from problems.systems.base import System
 from problems.trace.fold import Fold
-from problems.trace.functions import FUNCTIONS
 from problems.trace.graph import PAR, STATE, Affine, Node, T, reachable
 
 Pieces = list[tuple[Any, Any]]
@@ -142,21 +142,4 @@ def _applied(node: Node, args: Sequence[tuple[Any, Any]]) -> Pieces | None:
             return [(a, b), (-a, -b)]
         case "sign" if moving[0]:
             return [(0.0, 1.0), (0.0, -1.0)]
-    return None if any(moving) else [(0.0, _number(node, [value for _, value in args]))]
-
-
-def _number(node: Node, args: Sequence[Any]) -> Any:
-    """Return the value of an operation on numbers, or on arrays of them; NaN where there is none."""
-    match node.op:
-        case "pow":
-            return np.power(args[0], node.data)
-        case "table":
-            return node.data.at(args[0])
-
-    def value(*numbers: float) -> float:
-        try:
-            return FUNCTIONS[node.op].value(*numbers)
-        except (ValueError, OverflowError):
-            return np.nan
-
-    return np.vectorize(value, otypes=[float])(*args)
+    return None if any(moving) else [(0.0, DOUBLES.value(node, *(value for _, value in args)))]

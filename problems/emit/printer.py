@@ -3,10 +3,9 @@
 from collections.abc import Callable, Sequence
 
 from problems.emit.plan import Let, Plan, Reduce, Store
+from problems.trace.arithmetic import ARITHMETIC, LEAF, SUM
 from problems.trace.graph import Affine, Loop, Node
 
-_SUM, _PRODUCT, _LEAF = 1, 2, 3
-_OPERATORS = {"add": (" + ", _SUM), "sub": (" - ", _SUM), "mul": ("*", _PRODUCT), "div": ("/", _PRODUCT)}
 _LONGEST = 72
 _PREFIX = {
     "y": "y",
@@ -150,7 +149,7 @@ class Printer:
         """Whether a value's text waits for the one place that uses it."""
         return node.id in self._pending
 
-    def text(self, node: Node, level: int = _SUM) -> str:
+    def text(self, node: Node, level: int = SUM) -> str:
         """Return the text of a value, in parentheses if it binds less tightly than ``level``."""
         if node.op == "const":
             return repr(node.data) if repr(node.data)[0] != "-" else f"({node.data!r})"
@@ -160,15 +159,15 @@ class Printer:
         return text if binding >= level else f"({text})"
 
     def _operation(self, node: Node) -> tuple[str, int]:
-        if node.op in _OPERATORS:
-            symbol, level = _OPERATORS[node.op]
-            left = self.text(node.args[0], level)
-            return left + symbol + self.text(node.args[1], level + 1), level
-        if node.op == "neg":
-            return "-" + self.text(node.args[0], _LEAF), _SUM
+        known = ARITHMETIC.get(node.op)
+        if known is not None and known.arity == 1:
+            return known.text + self.text(node.args[0], LEAF), known.level
+        if known is not None:
+            left = self.text(node.args[0], known.level)
+            return left + known.text + self.text(node.args[1], known.level + 1), known.level
         name = self._functions[node.op]
         first, *others = node.args
         if others:
-            return name.format(*(self.text(arg, _LEAF) for arg in node.args)), _LEAF
+            return name.format(*(self.text(arg, LEAF) for arg in node.args)), LEAF
         text = self.text(first)
-        return (name.format(text) if "{" in name else f"{name}({text})"), _LEAF
+        return (name.format(text) if "{" in name else f"{name}({text})"), LEAF

@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from problems import limits
+from problems.trace.arithmetic import ARITHMETIC
 from problems.trace.functions import FUNCTIONS
 from problems.trace.source_line import refuse, users_line
 
@@ -123,7 +124,8 @@ class Table:
 
     def at(self, x: Any) -> Any:
         """Return the value at a number or an array of any kind, of doubles or of more digits."""
-        place = np.searchsorted(self.knots, getattr(x, "hi", x), side="right") - 1
+        leading = np.asarray(getattr(x, "hi", x), dtype=np.float64)
+        place = np.searchsorted(self.knots, leading, side="right") - 1
         place = np.clip(place, 0, len(self.rows) - 1)
         rest = x - np.array(self.knots)[place]
         first, *others = np.array(self.rows).T
@@ -555,8 +557,8 @@ class Graph:
     def apply(self, node: Node, args: tuple[Node, ...]) -> Node:
         """Return the operation of ``node`` on other arguments."""
         match node.op:
-            case "add" | "sub" | "mul" | "div" | "neg" | "where":
-                return getattr(self, node.op)(*args)
+            case op if op in ARITHMETIC or op == "where":
+                return getattr(self, op)(*args)
             case "pow":
                 return self.int_power(args[0], node.data)
             case "sum":

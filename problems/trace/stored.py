@@ -16,13 +16,20 @@ from numpy.typing import NDArray
 
 from problems import limits
 from problems.errors import InputError, shown
+from problems.trace.arithmetic import ARITHMETIC
 from problems.trace.functions import FUNCTIONS
 from problems.trace.graph import PAR, P, Q, T
 
 _ARGUMENTS = {
-    "const": 0, "symbol": 0, "index": 0, "add": 2, "sub": 2, "mul": 2, "div": 2, "neg": 1, "pow": 1, "sum": 1,
-    "where": 3, "table": 1,
-} | {name: function.arity for name, function in FUNCTIONS.items()}  # fmt: skip
+    "const": 0,
+    "symbol": 0,
+    "index": 0,
+    "pow": 1,
+    "sum": 1,
+    "where": 3,
+    "table": 1,
+    **{name: record.arity for name, record in (ARITHMETIC | FUNCTIONS).items()},
+}
 _LARGEST = 2**53  # of an index, up to which doubles and 64-bit integers are exact alike
 
 

@@ -10,7 +10,7 @@ import problems
 from integrators import HBVM, IAS15, Gauss, gradient, integrate
 from integrators.dynamics.recorded import Recorded
 from problems import Hamiltonian, InputError, Problem, VectorField
-from problems.analysis.wide import evaluate
+from problems.evaluate.wide import evaluate
 from tests.integrators.kernel.test_variations import SYSTEMS, flow, wide
 
 NUDGE = 1e-11  # of differences in 36 digits; see `test_variations`

@@ -8,7 +8,7 @@ import problems
 from integrators import HBVM, Gauss, Status, integrate, integrate_many, load
 from integrators.coefficients.legendre import tables
 from problems import Hamiltonian, InputError, Lagrangian, Poisson, Problem, VectorField
-from problems.analysis.wide import evaluate
+from problems.evaluate.wide import evaluate
 
 _MP = mpmath.MPContext()
 _MP.dps = 36

@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from problems import Hamiltonian, Problem, VectorField
-from problems.analysis import wide
 from problems.analysis.invariants import evaluate
 from problems.double_double import DD
+from problems.evaluate import wide
 
 
 def oscillator(amplitude: float) -> Problem:

@@ -1,0 +1,110 @@
+"""A graph evaluated over arrays of states, with numbers of any kind.
+
+Constants, parameters and states are the doubles that the integrators see; every operation carries the digits
+of the numbers.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from problems.calculus.function import Function
+from problems.trace.fold import Fold
+from problems.trace.graph import Loop, Node, reachable
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Numbers:
+    """Arrays of numbers of one kind, which have operators and can be indexed like NumPy's.
+
+    Attributes
+    ----------
+    of : callable
+        Makes such numbers of doubles.
+    operations : mapping of str to callable
+        The value of each operation at such numbers.
+    rows : callable
+        ``rows(values, n, columns)``: the values, broadcast to the shape (n, columns).
+    total : callable
+        The sum of an array along its first axis.
+    """
+
+    of: Callable[[Any], Any]
+    operations: Mapping[str, Callable[..., Any]]
+    rows: Callable[[Any, int, int], Any]
+    total: Callable[[Any], Any]
+
+    def value(self, node: Node, *args: Any) -> Any:
+        """Return the value of an operation at numbers."""
+        if node.op == "pow":
+            return self.operations["pow"](args[0], node.data)
+        return node.data.at(args[0]) if node.op == "table" else self.operations[node.op](*args)
+
+
+class Evaluator(Fold[Any]):
+    """The values of nodes at states: in a loop one row per term, one column per state.
+
+    Parameters
+    ----------
+    numbers : Numbers
+        The kind.
+    t, y, par
+        Times (1, n), states (dim, n) and parameters (n_par, 1) or (n_par, n), of that kind.
+    n : int
+        Number of states.
+    """
+
+    def __init__(self, numbers: Numbers, t: Any, y: Any, par: Any, n: int) -> None:
+        super().__init__()
+        self._numbers, self._n = numbers, n
+        self._inputs = {"t": t, "y": y, "par": par}
+
+    def outputs(self, function: Function) -> list[Any]:
+        """Return the outputs of a function, shape (n,) each."""
+        # Overflow and 0/0 at a state that is not finite give nan there, which is the answer.
+        with np.errstate(all="ignore"):
+            for node in reachable(function.roots):
+                if node.loop is None:
+                    self.known[node.id] = self.visit(node, [self.known.get(arg.id) for arg in node.args])
+            summands: list[list[Any]] = [[] for _ in function.outputs]
+            for loop, entries in function.loops:
+                values = self._inside([entry.node for entry in entries], loop)
+                for entry, terms in zip(entries, values, strict=True):
+                    for row, place in enumerate(entry.index.values(loop)):
+                        summands[place].append(terms[row])
+            for terms, parts in zip(function.outputs, summands, strict=True):
+                parts.extend(self.known[term.node.id] for term in terms)
+            return [self._added(parts) for parts in summands]
+
+    def _added(self, parts: list[Any]) -> Any:
+        return self._numbers.rows(sum(parts, start=self._numbers.of(0.0)), 1, self._n)[0]
+
+    def _inside(self, roots: list[Node], loop: Loop) -> list[Any]:
+        """Return the values of nodes of a loop, shape (terms, n) each; of others the same in each term."""
+        body: dict[int, Any] = {}
+        for node in reachable(roots, loop):
+            args = [body[arg.id] if arg.id in body else self.known[arg.id] for arg in node.args]
+            body[node.id] = self.visit(node, args)
+        found = [body[root.id] if root.id in body else self.known[root.id] for root in roots]
+        return [self._numbers.rows(values, len(loop), self._n) for values in found]
+
+    def visit_const(self, node: Node) -> Any:
+        return self._numbers.of(node.data)
+
+    def visit_symbol(self, node: Node) -> Any:
+        space, place = node.data
+        return self._inputs[space][place if isinstance(place, int) else place.values(node.loop)]
+
+    def visit_index(self, node: Node) -> Any:
+        return self._numbers.of(node.data.values(node.loop).astype(np.float64)[:, np.newaxis])
+
+    def visit_sum(self, node: Node, _: Any) -> Any:
+        return self._numbers.total(self._inside([node.args[0]], node.data)[0])
+
+    def visit_operation(self, node: Node, *args: Any) -> Any:
+        return self._numbers.value(node, *args)

@@ -1,0 +1,77 @@
+"""A function at one state with 36 digits and exponents without bounds: where doubles under- or overflow.
+
+`problems.evaluate.pairs` calculates with pairs of doubles, whose products vanish below 1e-308 and are
+lost above 1e308, although the states that they come from are ordinary doubles: an oscillator of amplitude
+1e-170 has an energy of 1e-340. This is slow and is asked only there.
+"""
+
+import math
+import operator
+from collections.abc import Callable
+from typing import Any
+
+import mpmath
+import numpy as np
+from numpy.typing import NDArray
+
+from problems.calculus.function import Function
+from problems.evaluate.evaluator import Evaluator, Numbers
+from problems.trace.arithmetic import ARITHMETIC
+from problems.trace.functions import FUNCTIONS
+
+_DIGITS = 36
+_WIDE = mpmath.MPContext()  # of its own: the precision of mpmath.mp belongs to the user
+_WIDE.dps = _DIGITS
+
+
+def _guarded(function: Callable[..., Any], arguments: int) -> Callable[..., Any]:
+    """Return a function on arrays of numbers; nan where it has no value."""
+
+    def guarded(*args: Any) -> Any:
+        try:
+            value = function(*args)
+        except (ArithmeticError, ValueError):  # a pole, or outside of a function's domain
+            return _WIDE.nan
+        return value if isinstance(value, _WIDE.mpf) else _WIDE.nan  # a root of a negative number is complex
+
+    return np.frompyfunc(guarded, arguments, 1)
+
+
+_OPERATIONS: dict[str, tuple[Callable[..., Any], int]] = {
+    **{
+        name: (getattr(_WIDE, name), f.arity)
+        for name, f in FUNCTIONS.items()
+        if name not in ("abs", "sign", "round")
+    },
+    **{name: (record.value, record.arity) for name, record in ARITHMETIC.items()},
+    "abs": (abs, 1),
+    "sign": (lambda x: _WIDE.mpf(-1 if x < 0 else 1), 1),
+    "round": (_WIDE.nint, 1),
+    "pow": (operator.pow, 2),
+    "where": (lambda condition, a, b: a if condition > 0 else b, 3),
+}
+
+
+WIDE = Numbers(
+    of=np.frompyfunc(_WIDE.mpf, 1, 1),
+    operations={name: _guarded(function, n) for name, (function, n) in _OPERATIONS.items()},
+    rows=lambda values, n, columns: np.broadcast_to(np.asarray(values, dtype=object), (n, columns)),
+    total=lambda terms: np.add.reduce(terms, axis=0),
+)
+"""Numbers of mpmath with 36 digits."""
+
+
+def evaluate(function: Function, t: float, y: NDArray[np.float64], par: NDArray[np.float64]) -> list[Any]:
+    """Return the outputs at one state, numbers of mpmath; nan where one is not defined."""
+    t, y, par = (WIDE.of(np.asarray(values, dtype=np.float64).reshape(-1, 1)) for values in (t, y, par))
+    return [values[0] for values in Evaluator(WIDE, t, y, par, 1).outputs(function)]
+
+
+def relative(now: list[Any], before: list[Any]) -> float:
+    """Return the distance of two vectors in the 2-norm, relative to the second if that is not 0."""
+    size = _WIDE.norm(before)
+    gap = _WIDE.norm([a - b for a, b in zip(now, before, strict=True)])
+    try:
+        return float(gap / size if size != 0 else gap)
+    except OverflowError:
+        return math.inf
