@@ -97,13 +97,14 @@ def run_accuracy(
             done, _ = wait(running, timeout=PATIENCE, return_when=FIRST_COMPLETED)
             for future in done:
                 resolved = running.pop(future)
+                measured, series, failure = None, b"", ""
                 try:
                     record, series = future.result()
                     measured = decoded(record, Record)
                 except (InterruptedRunError, InputError, UnfinishedRunError):
                     raise
                 except (Exception, CancelledError) as error:  # of the executor, not of the case
-                    failure, measured = f"{type(error).__name__}: {error}".rstrip(": "), None
+                    failure = f"{type(error).__name__}: {error}".rstrip(": ")
                 attempts[resolved.id] += 1
                 if (measured is None or died(measured)) and attempts[resolved.id] < ATTEMPTS:
                     waiting.append(resolved)
