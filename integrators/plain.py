@@ -98,7 +98,8 @@ _TEXTS = ("title", "notes", "_made_with")
 
 def _checked(state: dict[Any, Any], system: System) -> dict[str, Any]:
     """Return the parts of a problem, each of the type and shape that compiled code takes for granted."""
-    if set(state) != {"y0", "par", "times", "t0", "t_end", "name", "arguments", "references", *_TEXTS}:
+    parts = {"y0", "par", "times", "t0", "t_end", "name", "arguments", "references", *_TEXTS}
+    if set(state) - {"bodies"} != parts:  # only bodies with names have the key
         refuse("a problem has other parts")
     n_times = None if state["times"] is None else np.size(state["times"])
     for key, size in {"y0": system.dim, "par": system.n_par, "times": n_times}.items():
@@ -112,6 +113,7 @@ def _checked(state: dict[Any, Any], system: System) -> dict[str, Any]:
         state[key] = float(state[key])
     references, arguments = state["references"], state["arguments"]
     texts = [*(state[key] for key in _TEXTS), *items(references, "the list of references")]
+    texts += items(state.get("bodies", ()), "the list of bodies")
     texts += [] if state["name"] is None else [state["name"]]
     texts += list(arguments) if isinstance(arguments, dict) else [None]
     if not all(isinstance(text, str) for text in texts):

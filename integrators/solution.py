@@ -28,6 +28,7 @@ from integrators.protocol import Array, DoubleDouble, MethodBase, Program, Stats
 from integrators.refusals import as_numbers
 from integrators.segments import Segments
 from problems.analysis import invariants
+from problems.bodies import Elements, elements
 from problems.checks import File, checked_arguments, readable
 from problems.double_double import DD
 from problems.errors import InputError, MissingLibraryError, printable, shown
@@ -413,6 +414,29 @@ class Solution:
             For a solution that has doubles only.
         """
         return as_mpmath(self.pairs)
+
+    def elements(self, body: int | str, primary: int | str = 0) -> Elements:
+        """Return the orbital elements of a body of `problems.nbody` at the samples.
+
+        Parameters
+        ----------
+        body : int or str
+            Which body, by its index or name.
+        primary : int or str
+            What the orbit is about: a body, ``"jacobi"`` for the centre of mass of all bodies before it, or
+            ``"barycentric"`` for that of all.
+
+        Returns
+        -------
+        Elements
+            Arrays of shape (n,): a, e, inc, Omega, omega, f, M and T; see `problems.bodies.Elements`.
+
+        Raises
+        ------
+        problems.errors.InputError
+            For a problem without bodies in space, and a body that is not there.
+        """
+        return elements(self.problem, self.y, self.t, body=body, primary=primary)
 
     def guards(self) -> dict[str, Array]:
         """Return the quantities that are exactly zero by a symmetry, by name."""

@@ -49,6 +49,8 @@ class Problem:
         Sources of the problem.
     notes : str
         Remarks.
+    bodies : sequence of str
+        Names of the bodies of an N-body problem.
 
     Raises
     ------
@@ -76,6 +78,7 @@ class Problem:
     references: tuple[str, ...]
     notes: str
     _made_with: str
+    bodies: tuple[str, ...] = ()
 
     @checked_arguments
     def __init__(
@@ -95,6 +98,7 @@ class Problem:
         times: ArrayLike | None = None,
         references: Sequence[str] = (),
         notes: str = "",
+        bodies: Sequence[str] = (),
     ) -> None:
         if not isinstance(system, System):
             raise InputError(f"a Problem needs a Hamiltonian or a VectorField, not {shown(system)}.")
@@ -108,6 +112,7 @@ class Problem:
         if parameters:
             printed.append(f"parameters={ {key: parameters[key] for key in parameters}!r}")
         printed += [f"t0={t0!r}"] if t0 != 0.0 else []
+        printed += [f"bodies={list(bodies)!r}"] if bodies else []
         values = {
             "system": system,
             "y0": _frozen(state),
@@ -122,6 +127,8 @@ class Problem:
             "times": None if grid is None else _frozen(grid),
             "_made_with": ", ".join([repr(system), *printed, f"t_end={t_end!r}"]),
         }
+        if bodies:
+            values["bodies"] = tuple(bodies)
         for key, value in values.items():
             object.__setattr__(self, key, value)
 
@@ -182,6 +189,7 @@ class Problem:
             },
             t0=self.t0 if t0 is None else t0,
             t_end=self.t_end if t_end is None else t_end,
+            bodies=self.bodies,
         )
 
     def __getstate__(self) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from problems.bodies.nbody import masses_of, rows_of
+from problems.bodies.states import masses_of, rows_of
 from problems.checks import at_least, checked_arguments
 from problems.errors import InputError, shown
 

@@ -12,14 +12,28 @@ from problems.checks import checked_arguments
 from problems.errors import InputError, shown
 from problems.problem import Problem, check_is_problem
 
+UNSET = (False,)  # of a pointer to code
 SET = (
     ("gravity", ("basic",), "its gravity is {!r}, not 'basic'"),
     ("collision", ("none",), "it looks for collisions ({!r})"),
     ("boundary", ("none",), "it has a boundary ({!r})"),
     ("testparticle_type", (0,), "its test particles pull the others (testparticle_type={!r})"),
     ("N_var", (0,), "it has variational particles"),
+    ("_gravity_custom", UNSET, "it has a gravity of its own (gravity_custom)"),
+    ("_pre_timestep_modifications", UNSET, "it calls a function before a step (pre_timestep_modifications)"),
+    ("_post_timestep_modifications", UNSET, "it calls a function after a step (post_timestep_modifications)"),
+    ("_heartbeat", UNSET, "it calls a function after each step (heartbeat)"),
+    ("_N_odes", (0,), "it integrates {!r} other systems of equations (create_ode)"),
+    ("exit_max_distance", (0.0,), "it ends where a body is far away (exit_max_distance={!r}); use an event"),
+    ("exit_min_distance", (0.0,), "it ends where two bodies are near (exit_min_distance={!r}); use an event"),
 )
 """What of a simulation no problem has: its attribute, the values that are taken, and how others are told."""
+ADDITIONAL = (
+    "_additional_forces",
+    UNSET,
+    "it has forces that are code (additional_forces, or those of REBOUNDx); give them again as forces=",
+)
+"""The same, which is taken where forces are given."""
 
 
 @checked_arguments
@@ -33,7 +47,8 @@ def from_rebound(simulation: Any, *, t_end: float, forces: Sequence[Any] = ()) -
     t_end : float
         The end of the integration, in the simulation's units, as everything is.
     forces : sequence
-        What else acts, as for `problems.nbody`: REBOUND's additional forces are code, and are not taken over.
+        What else acts, as for `problems.nbody`. REBOUND's additional forces are code: a simulation with them
+        is taken only where they are given here again.
 
     Returns
     -------
@@ -43,7 +58,9 @@ def from_rebound(simulation: Any, *, t_end: float, forces: Sequence[Any] = ()) -
     Raises
     ------
     problems.errors.InputError
-        For a simulation with collisions, boundaries, another gravity, or massless bodies between others.
+        For a simulation with massless bodies between others, and with what a problem does not have:
+        collisions, boundaries, another gravity, additional forces, functions that are called at each step,
+        distances that end it. The sentence names it.
 
     Examples
     --------
@@ -59,8 +76,9 @@ def from_rebound(simulation: Any, *, t_end: float, forces: Sequence[Any] = ()) -
     """
     if not hasattr(simulation, "particles") or not hasattr(simulation, "N_active"):
         raise InputError(f"{shown(simulation)} is no rebound.Simulation.")
-    for name, taken, told in SET:
+    for name, taken, told in SET if forces else (*SET, ADDITIONAL):
         value = getattr(simulation, name)
+        value = bool(value) if taken is UNSET else value
         if value not in taken:
             raise InputError(f"the simulation cannot be taken over: {told.format(value)}.")
     simulation.synchronize()
@@ -72,12 +90,14 @@ def from_rebound(simulation: Any, *, t_end: float, forces: Sequence[Any] = ()) -
         raise InputError(
             "bodies without mass must be the last ones; add them to the simulation after the others."
         )
+    names = [body.name for body in particles]
     return nbody(
         masses[:n],
         [[body.x, body.y, body.z] for body in particles],
         [[body.vx, body.vy, body.vz] for body in particles],
         massless=len(particles) - n, forces=forces, G=simulation.G,
-        softening=simulation.softening or None, t0=simulation.t, t_end=t_end,
+        softening=simulation.softening or None, names=names if all(names) else (),
+        t0=simulation.t, t_end=t_end,
     )  # fmt: skip
 
 

@@ -65,6 +65,18 @@ def test_a_solution_whose_masses_an_event_has_changed():
     assert end.particles[1].vxyz == pytest.approx(found.v[-1, 3:6], rel=4e-16)  # v = p/m
 
 
+def test_names_are_taken_over_where_all_bodies_have_one():
+    assert from_rebound(_planets(massless=0), t_end=10.0).bodies == ("Sun", "Jupiter", "Saturn")
+    assert from_rebound(_planets(), t_end=10.0).bodies == ()
+
+
+def test_forces_of_rebound_that_are_given_again_are_taken():
+    simulation = _planets(massless=0)
+    simulation.additional_forces = lambda s: None
+    flat = problems.bodies.J2(J2=1e-3, R=0.5)
+    assert from_rebound(simulation, t_end=10.0, forces=[flat]).system.dof == 9
+
+
 def test_forces_that_are_added():
     simulation = _planets(massless=0)
     flat = problems.bodies.J2(J2=1e-3, R=0.5)
@@ -80,6 +92,13 @@ def test_forces_that_are_added():
         (lambda s: setattr(s, "collision", "direct"), "it looks for collisions"),
         (lambda s: setattr(s, "testparticle_type", 1), "its test particles pull"),
         (lambda s: setattr(s.particles[1], "m", 0.0), "must be the last ones"),
+        (lambda s: setattr(s, "additional_forces", lambda s: None), "additional_forces.* again as forces="),
+        (lambda s: setattr(s, "heartbeat", lambda s: None), "heartbeat"),
+        (lambda s: setattr(s, "pre_timestep_modifications", lambda s: None), "pre_timestep_modifications"),
+        (lambda s: setattr(s, "post_timestep_modifications", lambda s: None), "post_timestep_modifications"),
+        (lambda s: setattr(s, "exit_max_distance", 100.0), "exit_max_distance=100.0.*use an event"),
+        (lambda s: setattr(s, "exit_min_distance", 0.01), "exit_min_distance=0.01.*use an event"),
+        (lambda s: s.create_ode(length=1), "create_ode"),
     ],
 )
 def test_what_cannot_be_taken_over(change, words):
