@@ -181,8 +181,15 @@ def absolute(a: DD) -> DD:
 
 
 def sign(a: DD) -> DD:
-    """Return 1 or -1, with the sign of the number (of zero too)."""
-    return DD(np.copysign(1.0, a.hi))
+    """Return 1, 0 or -1."""
+    return DD(np.sign(a.hi))
+
+
+def floor(a: DD) -> DD:
+    """Return the largest whole number that is not larger."""
+    high = np.floor(a.hi)
+    # Where the first half is whole, the second one decides.
+    return where(high == a.hi, DD(high) + np.floor(a.lo), DD(high))
 
 
 def rint(a: DD) -> DD:
@@ -224,15 +231,27 @@ def _reduced(a: DD, step: Fraction) -> tuple[DD, Array]:
     return r, k
 
 
-def exp(a: DD) -> DD:
-    """Return e**a: halved 9 times after taking out powers of two, Taylor, squared back."""
+def _exp(a: DD) -> tuple[DD, Array]:
+    """Return u, k with e**a = (1 + u) 2**k: r = a - k log 2 halved 9 times, Taylor, squared back."""
     r, k = _reduced(a, _LN2)
     r = r.scaled(-9)
     # exp(r) - 1, so that squaring back loses nothing: (1 + u)**2 - 1 = 2u + u**2.
     u = r * _series(r, _inverse_factorials(1, 1, 10, False))
     for _ in range(9):
         u = u + u + u * u
-    return (u + 1.0).scaled(np.clip(np.nan_to_num(k), -1100, 1100).astype(np.int64))
+    return u, np.clip(np.nan_to_num(k), -1100, 1100).astype(np.int64)
+
+
+def exp(a: DD) -> DD:
+    """Return e**a."""
+    u, k = _exp(a)
+    return (u + 1.0).scaled(k)
+
+
+def expm1(a: DD) -> DD:
+    """Return e**a - 1."""
+    u, k = _exp(a)
+    return where(k == 0, u, (u + 1.0).scaled(k) - 1.0)
 
 
 def log(a: DD) -> DD:
@@ -240,10 +259,51 @@ def log(a: DD) -> DD:
     start = np.log(a.hi)
     value = DD(start) + (a * exp(DD(-start)) - 1.0)
     # One step leaves (error of start)**2/2, about 1e-32 max(1, |log|)**2; near 1 that is relative to
-    # a small number, so there: log(a) = 2 artanh(z), z = (a - 1)/(a + 1), |z| < 1/30.
-    z = (a - 1.0) / (a + 1.0)
-    series = z * _series(z * z, [Fraction(2, 2 * n + 1) for n in range(12)])
-    return where(np.abs(a.hi - 1.0) < 1.0 / 16.0, series, value)
+    # a small number, so there the series of log(1 + x).
+    return where(np.abs(a.hi - 1.0) < _NEAR_ONE, _log1p_series(a - 1.0), value)
+
+
+_NEAR_ONE = 1.0 / 16.0
+
+
+def _log1p_series(x: DD) -> DD:
+    """Return log(1 + x) for |x| < 1/16, as 2 artanh(z) with z = x/(x + 2), |z| < 1/30."""
+    z = x / (x + 2.0)
+    return z * _series(z * z, [Fraction(2, 2 * n + 1) for n in range(12)])
+
+
+def log1p(a: DD) -> DD:
+    """Return log(1 + a)."""
+    return where(np.abs(a.hi) < _NEAR_ONE, _log1p_series(a), log(a + 1.0))
+
+
+_HUGE = 1e18  # of a number, beyond which its square is the same with 1 added
+
+
+def asinh(a: DD) -> DD:
+    """Return the inverse hyperbolic sine: log(1 + x + x^2/(1 + sqrt(1 + x^2))) for x > 0."""
+    x = absolute(a)
+    far = x.hi > _HUGE
+    near = where(far, DD(np.zeros_like(x.hi)), x)
+    square = near * near
+    large = log(where(far, x, DD(np.ones_like(x.hi)))) + _constant(_LN2)
+    value = where(far, large, log1p(near + square / (sqrt(square + 1.0) + 1.0)))
+    return where(a.hi < 0, -value, value)
+
+
+def acosh(a: DD) -> DD:
+    """Return the inverse hyperbolic cosine: log(1 + (x - 1) + sqrt((x - 1)(x + 1)))."""
+    far = a.hi > _HUGE
+    near = where(far, DD(np.ones_like(a.hi)), a)
+    less = near - 1.0
+    return where(far, log(a) + _constant(_LN2), log1p(less + sqrt(less * (near + 1.0))))
+
+
+def atanh(a: DD) -> DD:
+    """Return the inverse hyperbolic tangent: log(1 + 2x/(1 - x))/2 for x > 0."""
+    x = absolute(a)
+    value = log1p(2.0 * x / (1.0 - x)) * 0.5
+    return where(a.hi < 0, -value, value)
 
 
 def _sin_cos(a: DD) -> tuple[DD, DD]:

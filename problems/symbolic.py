@@ -13,7 +13,8 @@ from problems.systems.vector_field import VectorField
 FUNCTIONS = {
     "sin": "sin", "cos": "cos", "tan": "tan", "exp": "exp", "log": "log", "Abs": "abs", "sinh": "sinh",
     "cosh": "cosh", "tanh": "tanh", "asin": "asin", "acos": "acos", "atan": "atan", "atan2": "atan2",
-    "erf": "erf", "erfc": "erfc",
+    "asinh": "asinh", "acosh": "acosh", "atanh": "atanh", "erf": "erf", "erfc": "erfc", "floor": "floor",
+    "sign": "sign", "Min": "min", "Max": "max",
 }  # fmt: skip
 """SymPy's names of functions, and what a formula calls them."""
 

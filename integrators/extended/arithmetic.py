@@ -176,9 +176,16 @@ def fabs(a):
 
 
 @njit
-def copysign(x, a):
-    """Return the double x with the sign of a number."""
-    return math.copysign(x, a.real)
+def sign(a):
+    """Return 1, 0 or -1."""
+    return complex(np.sign(a.real), 0.0)
+
+
+@njit
+def floor(a):
+    """Return the largest whole number that is not larger."""
+    high = np.floor(a.real)
+    return complex(high, np.floor(a.imag) if high == a.real else 0.0)
 
 
 @njit
@@ -192,7 +199,7 @@ def whole(a):
     return complex(high, 0.0)
 
 
-FUNCTIONS = (plus, minus, times, over, sqrt, sin, cos, tan, exp, log, fabs, copysign, whole)
+FUNCTIONS = (plus, minus, times, over, sqrt, sin, cos, tan, exp, log, fabs, sign, floor, whole)
 _OPERATORS = {ast.Add: "plus", ast.Sub: "minus", ast.Mult: "times", ast.Div: "over"}
 
 

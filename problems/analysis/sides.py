@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from problems.analysis.structure import has_kink
+from problems.analysis.structure import WITHOUT_END, has_kink
 from problems.calculus.function import Function, Term
 from problems.trace.graph import STATE, Node, T, Table, reachable
 
@@ -31,7 +31,7 @@ def sides(field: Function) -> Function | None:
         node
         for node in reachable(field.roots)
         if (has_kink(node) or node.op == "table")
-        and node.args[0].flags & (STATE | T if node.op == "round" else STATE)
+        and node.args[0].flags & (STATE | T if node.op in WITHOUT_END else STATE)
     ]
     if not conditions:
         return None
@@ -52,7 +52,7 @@ def _side(node: Node) -> Node:
     if node.op == "table":
         knots = node.data.knots
         side = graph.table(x, Table(knots, tuple((float(i),) for i in range(len(knots) - 1))))
-    elif node.op == "round":
+    elif node.op in WITHOUT_END:
         side = node
     else:
         side = graph.where(x, graph.const(1.0), graph.const(0.0))
@@ -71,6 +71,8 @@ def _distance(node: Node) -> Node:
         x = (x - low) * (high - x)
     elif node.op == "round":
         x = 0.25 - (x - node) ** 2
+    elif node.op == "floor":
+        x = (x - node) * (1.0 - (x - node))
     return x if node.loop is None else _smallest(graph.sum(_inverse_square(x), node.loop))
 
 

@@ -9,6 +9,9 @@ from problems.trace.fold import Fold
 from problems.trace.functions import FUNCTIONS
 from problems.trace.graph import STATE, Node, T, reachable
 
+WITHOUT_END = ("round", "floor")
+"""Functions that jump again and again, at places that no list can hold."""
+
 
 def degree(system: System, par: ArrayLike | None = None) -> int | None:
     """Return the degree of the energy as a polynomial in the state.

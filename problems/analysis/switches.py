@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from problems.analysis.structure import has_kink
+from problems.analysis.structure import WITHOUT_END, has_kink
 from problems.evaluate.doubles import DOUBLES
 from problems.systems.base import System
 from problems.trace.fold import Fold
@@ -43,7 +43,7 @@ class Switches:
             for node in nodes
             if (has_kink(node) or node.op == "table")
             and node.args[0].flags & (T | STATE) == T
-            and node.op != "round"  # which switches without end: see `problems.analysis.sides`
+            and node.op not in WITHOUT_END  # see `problems.analysis.sides`
         ]
 
     @cached_property

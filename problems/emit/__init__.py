@@ -35,11 +35,14 @@ _WRITERS = {"numpy": numpy_text, "numba": numba_text, "jax": jax_text, "heyoka":
 BACKENDS = tuple(_WRITERS)
 LONG, PER_SECOND = 3000, 400  # operations of a field of which its writer is told; compiled in a second, about
 _COST = {name: function.cost for name, function in FUNCTIONS.items()} | {"table": SLOW}
-_MATHEMATICS = sorted({f.numba.partition("(")[0] for f in FUNCTIONS.values()} - {""})
-_NUMBA_HEAD = f"""from math import {", ".join(_MATHEMATICS)}
+_CALLED = sorted({f.numba.partition("(")[0] for f in FUNCTIONS.values()} - {""})
+_ARRAYS = [name for name in _CALLED if name == "floor" or not hasattr(math, name)]  # math.floor is an integer
+_MATHEMATICS = {name: getattr(np if name in _ARRAYS else math, name) for name in _CALLED}
+_NUMBA_HEAD = f"""from math import {", ".join(name for name in _CALLED if name not in _ARRAYS)}
 
 import numba
 import numpy as np
+from numpy import {", ".join(_ARRAYS)}
 
 """
 
@@ -167,7 +170,7 @@ def numpy_of(function: Function, name: str, *, limit: int | None = SMALL) -> Cal
 def numba_of(function: Function, name: str) -> tuple[str, Callable[..., Any]]:
     """Return the source of such a function for numba, and it as a Python function that numba can compile."""
     emitted = _written(function, name, "numba", SMALL)
-    namespace: dict[str, Any] = {"np": np, **{name: getattr(math, name) for name in _MATHEMATICS}}
+    namespace: dict[str, Any] = {"np": np, **_MATHEMATICS}
     return emitted.text, _executed(emitted, namespace)
 
 

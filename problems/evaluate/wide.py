@@ -41,11 +41,10 @@ _OPERATIONS: dict[str, tuple[Callable[..., Any], int]] = {
     **{
         name: (getattr(_WIDE, name), f.arity)
         for name, f in FUNCTIONS.items()
-        if name not in ("abs", "sign", "round")
+        if name not in ("abs", "round")
     },
     **{name: (record.value, record.arity) for name, record in ARITHMETIC.items()},
     "abs": (abs, 1),
-    "sign": (lambda x: _WIDE.mpf(-1 if x < 0 else 1), 1),
     "round": (_WIDE.nint, 1),
     "pow": (operator.pow, 2),
     "where": (lambda condition, a, b: a if condition > 0 else b, 3),

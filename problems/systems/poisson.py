@@ -5,6 +5,7 @@ from typing import Annotated, Any
 
 from problems.calculus.function import Function
 from problems.calculus.gradient import gradient
+from problems.calculus.opposite import opposite
 from problems.checks import NOTHING, Named, at_least, checked_arguments
 from problems.errors import InputError
 from problems.systems.base import System, Value
@@ -22,8 +23,8 @@ class Poisson(System):
         The energy; its arguments are among ``y, par, m`` (and ``t``, but then the energy is not conserved).
         Use Python's sums: `m.sum` is for canonical systems.
     B : callable
-        Returns the structure matrix, dim lists of dim entries, with
-        ``B[j][i]`` written as ``-B[i][j]``; arguments as for ``H``.
+        Returns the structure matrix, dim lists of dim entries, with ``B[j][i]`` written as ``-B[i][j]``
+        or so that this can be seen, as ``1/x`` and ``-1/x``, ``x - y`` and ``y - x``; arguments as for ``H``.
     dim : int
         Length of the state.
     parameters, guards, name
@@ -114,15 +115,13 @@ class Poisson(System):
             [self._node(b, B, f"B's entry [{i}][{j}]") for j, b in enumerate(row)]
             for i, row in enumerate(rows)
         ]
-        for i in range(self.dim):
-            for j in range(i + 1):
-                a, b = matrix[i][j], -matrix[j][i]
-                zeros = a.op == b.op == "const" and a.data == b.data == 0.0  # 0 and -0 are two nodes
-                if a is not b and not zeros:
-                    raise InputError(
-                        f"{line}: B is not skew-symmetric as it is written: [{i}][{j}] is not minus "
-                        f"[{j}][{i}]; write the one as minus the other, and 0 on the diagonal."
-                    )
+        places = [(i, j) for i in range(self.dim) for j in range(i + 1)]
+        skew = opposite((matrix[i][j], matrix[j][i]) for i, j in places)
+        for i, j in (place for place, is_skew in zip(places, skew, strict=True) if not is_skew):
+            raise InputError(
+                f"{line}: B is not skew-symmetric as it is written: [{i}][{j}] is not minus "
+                f"[{j}][{i}]; write the one as minus the other, and 0 on the diagonal."
+            )
         return matrix
 
 

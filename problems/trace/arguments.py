@@ -161,6 +161,31 @@ class Mathematics:
         """Return the angle of the point (x, y), from -pi to pi."""
         return self._graph.call("atan2", self._graph.node(y), self._graph.node(x))
 
+    def hypot(self, x: Any, y: Any) -> Node:
+        """Return ``m.sqrt(x*x + y*y)``."""
+        x, y = self._graph.node(x), self._graph.node(y)
+        return self._graph.call("sqrt", x * x + y * y)
+
+    def min(self, first: Any, *others: Any) -> Node:
+        """Return the smallest of numbers; of equal ones the first, and its derivative."""
+        least = self._graph.node(first)
+        for other in map(self._graph.node, self._several("min", others)):
+            least = self._graph.where(least - other, other, least)
+        return least
+
+    def max(self, first: Any, *others: Any) -> Node:
+        """Return the largest of numbers; of equal ones the first, and its derivative."""
+        largest = self._graph.node(first)
+        for other in map(self._graph.node, self._several("max", others)):
+            largest = self._graph.where(other - largest, other, largest)
+        return largest
+
+    @staticmethod
+    def _several(name: str, others: tuple[Any, ...]) -> tuple[Any, ...]:
+        if not others:
+            refuse(f"m.{name} has one argument", f"give the numbers one by one, as in m.{name}(q[0], q[1])")
+        return others
+
     def where(self, condition: Any, a: Any, b: Any) -> Node:
         """Return ``a`` where a comparison such as ``q[0] > 1`` holds, else ``b``; ``& | ~`` join them."""
         a, b = self._graph.node(a), self._graph.node(b)
@@ -194,7 +219,7 @@ class Mathematics:
         if name.startswith("__"):
             raise AttributeError(name)
         if name not in OF_ONE_ARGUMENT:
-            known = [f"m.{function}" for function in (*OF_ONE_ARGUMENT, *_OTHERS)]
+            known = [f"m.{function}" for function in (*OF_ONE_ARGUMENT, *OTHERS)]
             refuse(str(unknown("function", f"m.{name}", known)).rstrip("."), "write it with these functions")
 
         def function(x: Any) -> Node:
@@ -204,7 +229,8 @@ class Mathematics:
         return function
 
 
-_OTHERS = ("atan2", "where", "table", "sum", "pi")
+OTHERS = ("atan2", "hypot", "min", "max", "where", "table", "sum", "pi")
+"""What else a formula finds in m."""
 
 
 def call(
@@ -291,7 +317,7 @@ def call(
         raise
     except NameError as error:
         name = error.name or "?"
-        if name in (*OF_ONE_ARGUMENT, *_OTHERS, "math", "np", "numpy"):
+        if name in (*OF_ONE_ARGUMENT, *OTHERS, "math", "np", "numpy"):
             remedy = "declare the argument m and use m.sqrt, m.sin, m.cos, m.exp, m.log, m.abs, m.sum, m.pi"
         elif name in layout:
             remedy = f"declare the argument par and write par.{name}"

@@ -56,17 +56,15 @@ class Elementary:
         exp' = exp.
     numpy, numba, jax : str
         Name in the library, or text with ``{}`` for the arguments; by default the same name. Those of
-        numba are from `math`; those of NumPy and JAX without a dot from `scipy.special`.
+        numba are from `math`, or else from NumPy; those of NumPy and JAX without a dot from `scipy.special`.
     heyoka : str or None
-        The same; ``None`` for what heyoka does not have, or not to all digits: it is refused.
+        The same; ``None`` for what heyoka does not have: it is refused.
     latex : str
         Text with ``%s`` for the arguments.
     cost : int
         Additions that take as long to compile.
     smooth : bool
         Whether the derivatives are continuous inside the domain.
-    public : bool
-        Whether formulas may call it; if not, it occurs in derivatives only.
     """
 
     name: str
@@ -83,7 +81,6 @@ class Elementary:
     latex: str = ""
     cost: int = SLOW
     smooth: bool = True
-    public: bool = True
 
     def __post_init__(self) -> None:
         names = {"numpy": f"np.{self.name}", "numba": self.name, "jax": f"jnp.{self.name}"}
@@ -153,6 +150,23 @@ _RECORDS = (
         latex="e^{%s}",
     ),
     Elementary(
+        name="expm1",
+        value=math.expm1,
+        domain=(-_INFINITY, 709.782712893384),
+        derivative=lambda x: Slope(_applied("exp", x)),
+        double_double=double_double.expm1,
+        latex=r"\left(e^{%s} - 1\right)",
+    ),
+    Elementary(
+        name="log1p",
+        value=math.log1p,
+        domain=(-0.9999999999999999, _INFINITY),
+        derivative=lambda x: Slope(over=1.0 + x),
+        double_double=double_double.log1p,
+        jax="(2.0*jnp.arcsinh(({0})/(2.0*jnp.sqrt(1.0 + ({0})))))",  # its own is right to 3e-14 only
+        latex=r"\ln\left(1 + %s\right)",
+    ),
+    Elementary(
         name="log",
         value=math.log,
         domain=(5e-324, _INFINITY),
@@ -173,17 +187,13 @@ _RECORDS = (
     ),
     Elementary(
         name="sign",
-        value=lambda x: math.copysign(1.0, x),
+        value=lambda x: float(x > 0.0) - float(x < 0.0),
         derivative=None,
         double_double=double_double.sign,
-        numpy="np.copysign(1.0, {})",
-        numba="copysign(1.0, {})",
-        jax="jnp.copysign(1.0, {})",
         heyoka="(hy.relup({0}) - hy.relup(-({0})))",
         latex=r"\operatorname{sign}\left(%s\right)",
         cost=1,
         smooth=False,
-        public=False,
     ),
     Elementary(
         name="round",
@@ -196,6 +206,16 @@ _RECORDS = (
         jax="jnp.rint",
         heyoka=None,
         latex=r"\operatorname{round}\left(%s\right)",
+        cost=1,
+        smooth=False,
+    ),
+    Elementary(
+        name="floor",
+        value=lambda x: float(math.floor(x)),
+        derivative=None,
+        double_double=double_double.floor,
+        heyoka=None,
+        latex=r"\left\lfloor %s \right\rfloor",
         cost=1,
         smooth=False,
     ),
@@ -244,6 +264,30 @@ _RECORDS = (
         latex=r"\arctan\left(%s\right)",
     ),
     Elementary(
+        name="asinh",
+        value=math.asinh,
+        derivative=lambda x: Slope(over=_applied("sqrt", 1.0 + x * x)),
+        double_double=double_double.asinh,
+        latex=r"\operatorname{arsinh}\left(%s\right)",
+    ),
+    Elementary(
+        name="acosh",
+        value=math.acosh,
+        domain=(1.0, _INFINITY),
+        derivative=lambda x: Slope(over=_applied("sqrt", (x - 1.0) * (x + 1.0))),
+        double_double=double_double.acosh,
+        latex=r"\operatorname{arcosh}\left(%s\right)",
+    ),
+    Elementary(
+        name="atanh",
+        value=math.atanh,
+        domain=(-0.9999999999999999, 0.9999999999999999),
+        derivative=lambda x: Slope(over=(1.0 - x) * (1.0 + x)),
+        double_double=double_double.atanh,
+        jax="jnp.arcsinh(({0})/jnp.sqrt((1.0 - ({0}))*(1.0 + ({0}))))",  # as for log1p
+        latex=r"\operatorname{artanh}\left(%s\right)",
+    ),
+    Elementary(
         name="erf",
         value=math.erf,
         derivative=lambda x: Slope(_applied("exp", -(x * x)), factor=_TWO_OVER_SQRT_PI),
@@ -259,7 +303,6 @@ _RECORDS = (
         double_double=double_double.erfc,
         numpy="erfc",
         jax="erfc",
-        heyoka=None,  # it has erf, and 1 - erf(x) is rounding where erfc(x) is small
         latex=r"\operatorname{erfc}\left(%s\right)",
     ),
     Elementary(
@@ -279,5 +322,5 @@ _RECORDS = (
 FUNCTIONS: dict[str, Elementary] = {record.name: record for record in _RECORDS}
 """All of them, by name."""
 
-OF_ONE_ARGUMENT = tuple(f.name for f in _RECORDS if f.public and f.arity == 1)
-"""Those that a formula may call with one argument."""
+OF_ONE_ARGUMENT = tuple(f.name for f in _RECORDS if f.arity == 1)
+"""Those of one argument."""

@@ -165,7 +165,7 @@ class Condition:
 _BRANCH = (
     "this compares or branches on a symbol",
     "the function is run once, on symbols, so write one formula for all states "
-    "(m.abs(x) for the absolute value, m.where(x > 0, a, b) for two pieces)",
+    "(m.abs(x), m.min(x, y), m.max(x, y); m.where(x > 0, a, b) for two pieces)",
 )
 
 
@@ -245,19 +245,19 @@ class Node:
 
     def __pow__(self, exponent: Any) -> "Node":
         if isinstance(exponent, Node):
-            refuse("a symbol stands in an exponent", "write x**y as m.exp(y*m.log(x))")
+            refuse("a symbol stands in an exponent", "for x >= 0 write x**y as m.exp(y*m.log(x))")
         if not isinstance(exponent, numbers.Real) or isinstance(exponent, bool):
             refuse(f"the exponent {exponent!r} is not a number", "give an integer or half an integer")
         twice = 2 * float(exponent)
         if not twice.is_integer() or abs(twice) > 2000:
             refuse(
                 f"the exponent {exponent!r} is not an integer or half an integer (up to 1000)",
-                "write x**a as m.exp(a*m.log(x))",
+                "for x >= 0 write x**a as m.exp(a*m.log(x))",
             )
         return self.graph.power(self, int(twice))
 
     def __rpow__(self, base: Any) -> NoReturn:
-        refuse("a symbol stands in an exponent", "write a**x as m.exp(x*m.log(a))")
+        refuse("a symbol stands in an exponent", "for a > 0 write a**x as m.exp(x*m.log(a))")
 
     # What a traced function cannot do. Comparisons refuse by themselves: `==` falling
     # back to identity would take one branch in silence.
@@ -286,7 +286,7 @@ class Node:
     def _number(self, *_: Any) -> NoReturn:
         refuse(
             "this needs the value of a symbol",
-            "declare the argument m and use m.sqrt, m.sin, m.cos, m.exp, m.log, m.abs, m.round, m.where",
+            "declare the argument m and use m.sqrt, m.sin, m.cos, m.exp, m.log, m.abs, m.floor, m.round, m.where",
         )
 
     __float__ = __int__ = __complex__ = __index__ = __round__ = __trunc__ = __floor__ = __ceil__ = _number
@@ -294,7 +294,7 @@ class Node:
     def _whole(self, *_: Any) -> NoReturn:
         refuse(
             "this takes // or % of a symbol",
-            "write it with m.round, or as a smooth formula: m.sin and m.cos are periodic",
+            "write x // y as m.floor(x/y), and x % y as x - y*m.floor(x/y)",
         )
 
     __floordiv__ = __rfloordiv__ = __mod__ = __rmod__ = __divmod__ = __rdivmod__ = _whole

@@ -15,6 +15,7 @@ import operator
 from inspect import signature
 from typing import Any, cast
 
+import numpy as np
 from llvmlite import ir
 from numba import extending, types
 from numba.extending import models, register_model
@@ -119,9 +120,18 @@ for _function, _name in (
     (math.sqrt, "sqrt"),
     (abs, "fabs"),
     (math.fabs, "fabs"),
-    (math.copysign, "copysign"),
+    (np.floor, "floor"),
 ):
-    register(_function, 2 if _name == "copysign" else 1, Lanes, intrinsic_call(_name))
+    register(_function, 1, Lanes, intrinsic_call(_name))
+
+
+def _sign(builder: Any, x: Any) -> Any:
+    zero, one, minus = (splat(builder, ir.Constant(DOUBLE, v), x.type.count) for v in (0.0, 1.0, -1.0))
+    below = builder.select(builder.fcmp_ordered("<", x, zero), minus, builder.fadd(x, zero))  # -0.0 to 0.0
+    return builder.select(builder.fcmp_ordered(">", x, zero), one, below)
+
+
+register(np.sign, 1, Lanes, _sign)
 
 
 # --- explicit operations --------------------------------------------------------------------------

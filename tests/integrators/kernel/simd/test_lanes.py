@@ -3,7 +3,7 @@
 import ctypes
 import math
 from fractions import Fraction
-from math import copysign, cos, exp, fabs, log, sin, sqrt, tan
+from math import cos, exp, fabs, log, sin, sqrt, tan
 
 import numpy as np
 import pytest
@@ -57,7 +57,7 @@ def arithmetic(t, y, par, out):
     out[8] = c - a
     out[9] = c * a
     out[10] = c / a
-    out[11] = copysign(1.0, a)
+    out[11] = np.sign(a)
     out[12] = 2 * a - 1
     out[13] = a
     out[13] += b
@@ -65,6 +65,7 @@ def arithmetic(t, y, par, out):
     out[14] /= 3.0
     out[15] = 7
     out[16] = a * b + c
+    out[17] = np.floor(a)
 
 
 ARITHMETIC = (
@@ -79,12 +80,13 @@ ARITHMETIC = (
     lambda a, b, c: c - a,
     lambda a, b, c: c * a,
     lambda a, b, c: c / a,
-    lambda a, b, c: np.copysign(1.0, a),
+    lambda a, b, c: np.sign(a),
     lambda a, b, c: 2 * a - 1,
     lambda a, b, c: a + b,
     lambda a, b, c: a / 3.0,
     lambda a, b, c: np.full_like(a, 7.0),
     lambda a, b, c: a * b + c,  # two roundings: nothing is contracted
+    lambda a, b, c: np.floor(a),
 )
 
 
