@@ -231,7 +231,7 @@ def _reduced(a: DD, step: Fraction) -> tuple[DD, Array]:
     return r, k
 
 
-def _exp(a: DD) -> tuple[DD, Array]:
+def _exp(a: DD) -> tuple[DD, NDArray[np.int64]]:
     """Return u, k with e**a = (1 + u) 2**k: r = a - k log 2 halved 9 times, Taylor, squared back."""
     r, k = _reduced(a, _LN2)
     r = r.scaled(-9)

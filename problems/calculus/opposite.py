@@ -1,4 +1,4 @@
-"""Which formulas are minus one another in all bits, however they are written: 1/x and -1/x, x - y and y - x."""
+"""Which formulas are minus one another in all bits, however they are written: 1/x and -1/x, for example."""
 
 from collections.abc import Hashable, Iterable
 

@@ -286,7 +286,7 @@ class Node:
     def _number(self, *_: Any) -> NoReturn:
         refuse(
             "this needs the value of a symbol",
-            "declare the argument m and use m.sqrt, m.sin, m.cos, m.exp, m.log, m.abs, m.floor, m.round, m.where",
+            "declare the argument m and use m.sqrt, m.sin, m.cos, m.exp, m.log, m.abs, m.round, m.where",
         )
 
     __float__ = __int__ = __complex__ = __index__ = __round__ = __trunc__ = __floor__ = __ceil__ = _number

@@ -92,8 +92,9 @@ class TestSearch:
                 lambda y, m: [[0, value(e, y, m), 0], [minus(e, y, m, data.draw), 0, 0], [0, 0, 0]],
                 dim=VARIABLES,
             )
-        except InputError as error:
-            assert "skew" not in str(error)  # powers of constants may overflow
+        except InputError as error:  # powers of constants may overflow
+            if "skew" in str(error):
+                raise
 
     @pytest.mark.slow
     @settings(max_examples=2000, deadline=None)
@@ -110,9 +111,7 @@ class TestSearch:
     def _compared(e, draw):
         other = mutated(e, draw)
         try:
-            system = VectorField(
-                lambda y, m: [value(e, y, m), minus(other, y, m, draw), y[2]], dim=VARIABLES
-            )
+            system = VectorField(lambda y, m: [value(e, y, m), minus(other, y, m, draw), y[2]], dim=VARIABLES)
         except InputError:
             return
         (a,), (b,), _ = system.field.outputs

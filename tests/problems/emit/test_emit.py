@@ -101,8 +101,8 @@ def test_loops_on_jax_agree_with_loops_on_numpy(case, states):
 def compiled(made: emit.Source, backend: str) -> Any:
     import math
 
-    namespace: dict[str, Any] = {"np": np} | {
-        name: getattr(math, name) for name in ("sqrt", "sin", "cos", "tan", "exp", "log", "fabs", "copysign")
+    namespace: dict[str, Any] = {"np": np, "sign": np.sign} | {
+        name: getattr(math, name) for name in ("sqrt", "sin", "cos", "tan", "exp", "log", "fabs")
     }
     exec(made.text, namespace)  # noqa: S102 -- the text under test
     return namespace[made.name]

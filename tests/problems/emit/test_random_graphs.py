@@ -131,7 +131,11 @@ def functions(system: System) -> list[Function | Jacobian]:
 def on_python(system: System, what: Function | Jacobian, limit: int | None) -> Callable[..., np.ndarray]:
     """Return the text for numba as a Python function: what numba would compile."""
     made = emit.source(system, what, "numba", limit=limit)
-    namespace: dict[str, Any] = {"np": np, **{name: getattr(math, name) for name in dir(math)}}
+    namespace: dict[str, Any] = {
+        **{name: getattr(math, name) for name in dir(math)},
+        "np": np,
+        "sign": np.sign,
+    }
     exec(made.text, namespace)  # noqa: S102 -- the text under test
     inner, n = namespace[made.name], n_outputs(system, what)
 

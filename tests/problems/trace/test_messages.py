@@ -231,7 +231,7 @@ REFUSED: dict[Callable[..., Any], tuple[str, str]] = {
     real_power: ("the exponent 0.3", "m.exp(a*m.log(x))"),
     symbolic_power: ("a symbol stands in an exponent", "m.exp(y*m.log(x))"),
     exponential: ("a symbol stands in an exponent", "m.exp(x*m.log(a))"),
-    remainder: ("takes // or % of a symbol", "smooth formula"),
+    remainder: ("takes // or % of a symbol", "x - y*m.floor(x/y)"),
     not_finite: ("the constant nan is not finite", "finite numbers"),
     zero_division: ("divides by the constant 0", "not zero"),
     symbol_from_elsewhere: ("belongs to another traced function", "do not keep symbols"),
