@@ -39,9 +39,7 @@ def _guarded(function: Callable[..., Any], arguments: int) -> Callable[..., Any]
 
 _OPERATIONS: dict[str, tuple[Callable[..., Any], int]] = {
     **{
-        name: (getattr(_WIDE, name), f.arity)
-        for name, f in FUNCTIONS.items()
-        if name not in ("abs", "round")
+        name: (getattr(_WIDE, name), f.arity) for name, f in FUNCTIONS.items() if name not in ("abs", "round")
     },
     **{name: (record.value, record.arity) for name, record in ARITHMETIC.items()},
     "abs": (abs, 1),
