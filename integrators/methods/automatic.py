@@ -106,6 +106,15 @@ def exact_k(nu: int, s: int) -> int:
     return max(s, -(-nu * s // 2))
 
 
+def nodes_of(system: System, s: int) -> int:
+    """Return the k of ``HBVM(s=s, tol=...)``: the exact one where the energy is a polynomial, else 2s.
+
+    More than s in any case: the estimate of a step's error is gamma_s, which s nodes do not determine.
+    """
+    nu = None if system.energy is None else degree(system)
+    return max(2 * s if nu is None else exact_k(nu, s), s + 1)
+
+
 def operations(function: Function) -> int:
     """Count the operations of a function that differ from stage to stage, expensive ones as several."""
     count = sum(len(terms) for terms in function.outputs)

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from integrators.caveats import undetected, undetected_in_time, unknown_discontinuities, why_undetected
+from integrators.methods.automatic import ACCURATE_IN_LANES, WIDE, choose, choose_projected, nodes_of
 from integrators.options import Absolute, Breakpoints, Count, Stages, Step, Tolerance
 from integrators.protocol import MethodBase, Program
 from problems.errors import InputError
@@ -85,7 +86,8 @@ class HBVM(MethodBase):
     Parameters
     ----------
     k : int, optional
-        Nodes of the quadrature, k >= s.
+        Nodes of the quadrature, k >= s. With ``s`` and ``tol`` it may be left out: as many as conserve the
+        energy exactly, nu s/2, where this is a polynomial of degree nu, else 2s; at least s + 1.
     s : int, optional
         Degree of the polynomial, s >= 1; the order is 2s. Without k and s, both are chosen from ``tol`` and
         the system.
@@ -190,9 +192,8 @@ class HBVM(MethodBase):
         super().__post_init__()
         if self.h is None and self.tol is None:
             object.__setattr__(self, "tol", TOLERANCE)
-        if (self.k is None) != (self.s is None):
-            missing = "k" if self.k is None else "s"
-            raise InputError(f"HBVM needs k and s, or neither of them; give {missing} too.")
+        if self.k is not None and self.s is None:
+            raise InputError(f"HBVM needs s with k={self.k!r}; give s too.")
         if self.k is None and self.tol is None:
             raise InputError(
                 f"HBVM needs k and s with a fixed step, h={self.h!r}; or give tol, and they are chosen."
@@ -224,25 +225,29 @@ class HBVM(MethodBase):
         """Accept every system; Poisson ones by fixed-point iteration, with a projection one with energy."""
         return self._refusal(problem.system)
 
+    def _nodes(self, system: System) -> int | None:
+        """Return k, ``None`` where it is chosen together with s."""
+        return nodes_of(system, self.s) if self.k is None and self.s is not None else self.k
+
     def caveat(self, problem: Problem) -> str | None:
         """Name a field with discontinuities that these options do not look for; see the class."""
-        poisson = problem.system.kind == "poisson"
+        k, poisson = self._nodes(problem.system), problem.system.kind == "poisson"
         why = (
             "the steps that keep a Poisson system's energy do not detect discontinuities" if poisson else None
         )
-        why = why or why_undetected(self.k, self.tol, self.solver)
+        why = why or why_undetected(k, self.tol, self.solver)
         discontinuities = (
             undetected(problem, why) if poisson or self.tol is None else undetected_in_time(problem, why)
         )
-        return discontinuities or unknown_discontinuities(problem, self.k, self.tol, self.breakpoints)
+        return discontinuities or unknown_discontinuities(problem, k, self.tol, self.breakpoints)
 
     def conserved(self, system: System) -> dict[str, float]:
-        """Return the energy, with a tolerance: at rounding where k is chosen, or with a projection."""
+        """Return the energy, with a tolerance: at rounding where s is chosen, or with a projection."""
         if self.tol is None or "energy" not in system.invariants:
             return {}
         if system.energy is None and self.projection is None:
             return {}
-        return {"energy": 0.0 if self.k is None or self.projection else self.tol}
+        return {"energy": 0.0 if self.s is None or self.projection else self.tol}
 
     def as_hbvm(self) -> "HBVM":
         """Return this method itself."""
@@ -285,10 +290,10 @@ class HBVM(MethodBase):
                     projected=self.projection is not None, **self.control(),
                 )  # fmt: skip
 
-            if self.k is not None and self.s is not None:
-                return program((self.k, self.s, None))
-            from integrators.methods.automatic import ACCURATE_IN_LANES, WIDE, choose, choose_projected
-
+            if self.s is not None:
+                k = self._nodes(system)
+                assert k is not None
+                return program((k, self.s, None))
             if self.projection:
                 return program(choose_projected(tol))
             alone, many = choose(system, tol), choose(system, tol, lanes=True)

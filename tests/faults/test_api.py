@@ -42,7 +42,7 @@ HBVM(k=4, s=2, h=[.1])                                       | h=[0.1] of HBVM m
 HBVM(k=4, s=2, h=np.array([.1, .2]))                         | h=array([0.1, 0.2]) of HBVM must be a finite s
 HBVM(k=4, s=2, h=np.array([.1]))                             | h=array([0.1]) of HBVM must be a finite step a
 HBVM(k=4, s=2, h=1j)                                         | h=1j of HBVM must be a finite step above 0; th
-HBVM(k=4, h=.1)                                              | HBVM needs k and s, or neither of them; give
+HBVM(k=4, h=.1)                                              | HBVM needs s with k=4; give s too
 HBVM(h=.1)                                                   | HBVM needs k and s with a fixed step, h=0.1;
 HBVM(tol=0)                                                  | tol=0 of HBVM must be a tolerance from 2.2e-16
 HBVM(tol=1)                                                  | tol=1 of HBVM must be a tolerance from 2.2e-16

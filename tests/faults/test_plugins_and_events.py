@@ -43,7 +43,7 @@ FAULTS = (
         r"did not converge; take a smaller sim\.dt\. This was at t = 3\.1",
         RuntimeError,
     ),
-    Fault("install(HBVM())", installed, r"chooses k and s .* HBVM\(k=8, s=8\)"),
+    Fault("install(HBVM())", installed, r"chooses k and s .* HBVM\(s=8\)"),
     Fault(
         "install(HBVM(max_step=))", lambda: installed(k=8, s=4, tol=1e-9, max_step=1.0), "max_step= .* leave"
     ),

@@ -88,7 +88,7 @@ _tables: dict[tuple[int, int], Any] = {}
 def install(simulation: Any, method: HBVM | Gauss) -> None:
     """Set ``method`` as the integrator of a simulation, and its h, if given, as the timestep.
 
-    With ``tol``, as in ``HBVM(k=10, s=8, tol=1e-12)``, the step size is adaptive, for close encounters. A
+    With ``tol``, as in ``HBVM(k=16, s=8, tol=1e-12)``, the step size is adaptive, for close encounters. A
     symplectic method, such as Gauss, then loses its long-time behaviour; one with k > s conserves the energy.
 
     Parameters
@@ -96,8 +96,9 @@ def install(simulation: Any, method: HBVM | Gauss) -> None:
     simulation : rebound.Simulation
         The simulation.
     method : HBVM or Gauss
-        As for `integrators.integrate`, with k and s. Without h and tol, as in ``HBVM(k=8, s=8)``, the
-        timestep remains ``simulation.dt``; with tol, h is the initial step size.
+        As for `integrators.integrate`, with s; without k, k = 2s, with which the energy is conserved to
+        rounding as a rule. Without h and tol, as in ``HBVM(s=8)``, the timestep remains ``simulation.dt``;
+        with tol, h is the initial step size.
 
     Raises
     ------
@@ -109,10 +110,8 @@ def install(simulation: Any, method: HBVM | Gauss) -> None:
         method = method.as_hbvm()
     if not isinstance(method, HBVM):
         raise InputError(f"install takes HBVM(k=, s=, h=) or Gauss(s=, h=), not {method!r}.")
-    if method.k is None or method.s is None:
-        raise InputError(
-            f"{method!r} chooses k and s itself, REBOUND's plugin does not: give HBVM(k=8, s=8)."
-        )
+    if method.s is None:
+        raise InputError(f"{method!r} chooses k and s itself, REBOUND's plugin does not: give HBVM(s=8).")
     if given := method.control():
         raise InputError(f"{next(iter(given))}= is not available in REBOUND: leave it out.")
     given_tol = method.tol is not None and (method.h is not None or method.tol != TOLERANCE)
@@ -123,7 +122,8 @@ def install(simulation: Any, method: HBVM | Gauss) -> None:
         )
     simulation.integrator = NAME
     options: Any = simulation.integrator  # not the name, but what holds its options
-    options.k, options.s, options.tol = method.k, method.s, method.tol if given_tol else 0.0
+    options.k, options.s = method.k or 2 * method.s, method.s
+    options.tol = method.tol if given_tol else 0.0
     if method.h is not None:
         simulation.dt = method.h
 
@@ -143,8 +143,24 @@ def _fail(simulation: int, code: int) -> None:
     t, dt = (
         (ctypes.c_double * layout.SIMULATION).from_address(simulation)[i] for i in (layout.TIME, layout.DT)
     )
-    message = f"{MESSAGES[code]} This was at t = {t!r}, dt = {dt!r}."
+    reason = code == layout.DIVERGED and _not_finite(simulation)
+    message = f"{reason or MESSAGES[code]} This was at t = {t!r}, dt = {dt!r}."
     rebound.clibrebound.reb_simulation_error(ctypes.c_void_p(simulation), ctypes.c_char_p(message.encode()))
+
+
+def _not_finite(simulation: int) -> str | None:
+    """Return which particle has no number as mass, position, velocity or acceleration, ``None`` if all have."""
+    sim = ctypes.cast(simulation, ctypes.POINTER(rebound.Simulation)).contents
+    for names in (("m", "x", "y", "z", "vx", "vy", "vz"), ("ax", "ay", "az")):  # forces follow from the rest
+        for i in range(sim.N):
+            for name in names:
+                value = getattr(sim.particles[i], name)
+                if not np.isfinite(value):
+                    return (
+                        f"Particle {i} has {name} = {value!r}, which must be a finite number; set it anew, or "
+                        f"remove the particle with sim.remove({i})."
+                    )
+    return None
 
 
 def _make_table(k: int, s: int) -> np.ndarray:

@@ -290,8 +290,8 @@ def test_what_cannot_be_done_is_refused_with_the_fix():
     for bad in (0.0, 1e-17, -1.0, 1.0, np.nan, "1e-8", True):
         with pytest.raises(InputError, match=r"tolerance from 2\.2e-16 to below 1"):
             HBVM(tol=bad)
-    with pytest.raises(InputError, match="HBVM needs k and s, or neither of them; give k too"):
-        HBVM(s=2, tol=1e-8)
+    with pytest.raises(InputError, match="HBVM needs s with k=4; give s too"):
+        HBVM(k=4, tol=1e-8)
     with pytest.raises(InputError, match="needs k and s with a fixed step"):
         HBVM(h=0.1)
     with pytest.raises(InputError, match="one stage tells nothing about its error"):
