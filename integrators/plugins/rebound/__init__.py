@@ -149,7 +149,7 @@ def _fail(simulation: int, code: int) -> None:
 
 
 def _not_finite(simulation: int) -> str | None:
-    """Return which particle has no number as mass, position, velocity or acceleration, ``None`` if all have."""
+    """Return which particle has a mass, place, velocity or force that is no number; ``None`` if none has."""
     sim = ctypes.cast(simulation, ctypes.POINTER(rebound.Simulation)).contents
     for names in (("m", "x", "y", "z", "vx", "vy", "vz"), ("ax", "ay", "az")):  # forces follow from the rest
         for i in range(sim.N):
@@ -157,8 +157,8 @@ def _not_finite(simulation: int) -> str | None:
                 value = getattr(sim.particles[i], name)
                 if not np.isfinite(value):
                     return (
-                        f"Particle {i} has {name} = {value!r}, which must be a finite number; set it anew, or "
-                        f"remove the particle with sim.remove({i})."
+                        f"Particle {i} has {name} = {value!r}, which must be a finite number; set it anew, "
+                        f"or remove the particle with sim.remove({i})."
                     )
     return None
 

@@ -127,7 +127,7 @@ class HBVM(OdeSolver):
             if first_step is not None or self.max_step < np.inf:
                 raise InputError(f"h={h!r} is the length of every step; leave out first_step and max_step.")
         one_stage = k == 1 and h is None  # tells the kernel nothing about the error of a step
-        if compiled is not None and t0 != t_bound and not one_stage:
+        if compiled is not None and not one_stage:
             if interpolant != "step":
                 raise InputError(
                     "interpolant='polynomial' is for functions in Python; with a compiled field states "

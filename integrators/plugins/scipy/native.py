@@ -1,15 +1,17 @@
 """Steps of the compiled kernel for a compiled field, and the states between them."""
 
+import math
 from functools import lru_cache
 from threading import Lock
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import DenseOutput
+from scipy.integrate import DenseOutput, OdeSolver
 
 import integrators
 from integrators.kernel.fixed import FixedStepper
+from integrators.kernel.varying import LATEST
 from integrators.methods.automatic import QUADRATURE_ERROR, exact_k
 from integrators.plugins.scipy.field import Field
 from integrators.protocol import Samples, Status
@@ -56,7 +58,7 @@ class NativeSteps:
         self, solver: Any, field: Field, *, k: int | None, s: int, h: float | None,
         first_step: float | None, every: int,
     ) -> None:  # fmt: skip
-        t, y, t_bound = solver.t, solver.y, solver.t_bound
+        t, y, t_bound = solver.t, solver.y, float(np.clip(solver.t_bound, -LATEST, LATEST))
         quadrature_error = None
         if k is None:
             k, quadrature_error = nodes(field.system, s)
@@ -101,10 +103,13 @@ class NativeSteps:
         if not (samples.t.size or samples.status.failed):
             samples = self._stepper.advance(np.array([self._t_bound]), sample="partial")
         if not samples.t.size:
-            return samples.reason
+            underflow = samples.status is Status.STEP_UNDERFLOW  # SciPy has a sentence for that
+            return (
+                f"{OdeSolver.TOO_SMALL_STEP} At t = {t!r}: {samples.reason}" if underflow else samples.reason
+            )
         self._before, self._made = (t, y), samples
         end = float(samples.t[-1])
-        if abs(end - self._t_bound) <= SNAP * np.spacing(abs(self._t_bound)):
+        if abs(end - self._t_bound) <= SNAP * math.ulp(self._t_bound):
             end = samples.t[-1] = self._t_bound
         return end, samples.y[-1].copy()
 
@@ -135,7 +140,7 @@ class _Count:
     def __init__(self, t0: float, h: float, t_bound: float) -> None:
         self._t0, self._h, self._n = t0, h, 0
         self._last: float = np.inf
-        if np.isfinite(t_bound):
+        if abs(t_bound) < LATEST:
             steps, _ = plan(np.array([t_bound]), np.array([t0]), h)
             self._last = int(steps[0])
 

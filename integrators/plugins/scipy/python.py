@@ -86,6 +86,7 @@ class PythonSteps:
         self._G = np.zeros((s, solver.n), solver.y.dtype)
         self._h = self._error_old = 0.0
         self._output: DenseOutput | None = None
+        self._errors = np.geterr()
 
     @property
     def k(self) -> int:
@@ -93,11 +94,16 @@ class PythonSteps:
         return self._stages.k
 
     def take(self, t: float, y: Array) -> tuple[float, Array] | str:
-        """Take a step from (t, y), which is where the last one ended; return time and state, or why not."""
-        if self._output is None and self._solver.vectorized:
-            self._stages.try_together(t, self._first(t, y), y, self._slope(t, y))
-        step = self._varying(t, y) if self._constant is None else self._of_constant_length(t, y)
-        return step if isinstance(step, str) else (step[0], self._add(t, *step, y))
+        """Take a step from (t, y), which is where the last one ended; return time and state, or why not.
+
+        What NumPy says of floating-point errors is kept back: an iteration that diverges meets states that
+        are none of the solution's, and is dealt with. At the solution's (`_slope`) it is the user's matter.
+        """
+        with np.errstate(all="ignore"):
+            if self._output is None and self._solver.vectorized:
+                self._stages.try_together(t, self._first(t, y), y, self._slope(t, y))
+            step = self._varying(t, y) if self._constant is None else self._of_constant_length(t, y)
+            return step if isinstance(step, str) else (step[0], self._add(t, *step, y))
 
     def _varying(self, t: float, y: Array) -> tuple[float, Solved] | str:
         """Solve for a step that the tolerances allow; return its end and solution, or why there is none."""
@@ -229,7 +235,10 @@ class PythonSteps:
 
     def _slope(self, t: float, y: Array) -> Array:
         """Return f at the start of the step, evaluated at most once."""
-        self._f = f = self._solver.fun(t, y) if self._f is None else self._f
+        f = self._f
+        if f is None:
+            with np.errstate(**self._errors):
+                f = self._f = self._solver.fun(t, y)
         return f
 
     def _error(self, t: float, h: float, y: Array, solved: Solved) -> float:
@@ -237,9 +246,8 @@ class PythonSteps:
         last = self._stages.last_coefficient(solved, h * self._slope(t, y) if self.k == 1 else None)
         largest = np.maximum(np.abs(y), np.abs(y + solved.G[0]))
         scale = self._solver.atol + largest * self._solver.rtol
-        with np.errstate(divide="ignore", invalid="ignore"):
-            top, bottom = norm(last / scale), norm(solved.G[0] / scale)
-            return 0.0 if top == 0.0 else float(np.divide(top * top, bottom))
+        top, bottom = norm(last / scale), norm(solved.G[0] / scale)
+        return 0.0 if top == 0.0 else float(np.divide(top * top, bottom))
 
     def _unseen(self, solved: Solved) -> float:
         """Return how much of the field k nodes do not see: up to 1, the energy is conserved to round-off.
@@ -278,7 +286,8 @@ class Output(DenseOutput):
         self._by_a_step = by_a_step
 
     def _call_impl(self, t: Array) -> Array:
-        states = np.array([self._at(time) for time in np.atleast_1d(t).tolist()]).reshape(t.size, -1).T
+        with np.errstate(all="ignore"):  # as in `PythonSteps.take`
+            states = np.array([self._at(time) for time in np.atleast_1d(t).tolist()]).reshape(t.size, -1).T
         return states[:, 0] if t.ndim == 0 else states
 
     def _at(self, t: float) -> Array:

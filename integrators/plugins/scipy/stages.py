@@ -132,7 +132,7 @@ class Stages:
                 residual = correct(residual)
             new = G + residual
             moved = np.abs(new - G).max(axis=0)
-            size = size_y + np.abs(new).max(axis=0)
+            size = np.maximum(size_y + np.abs(new).max(axis=0), moved)  # new may be 0
             top = size.max()
             if not np.isfinite(top):
                 return Solved(G, values, False, np.inf)

@@ -81,8 +81,8 @@ def adapted(
     module: str,
     settings: Mapping[str, Setting],
     fails: Mapping[str, str],
-    skips: Mapping[str, str] = {},  # noqa: B006 -- never changed
-    steps: Mapping[str, float] = {},  # noqa: B006 -- never changed
+    skips: Mapping[str, str] = {},
+    steps: Mapping[str, float] = {},
 ) -> dict[str, Any]:
     """Return the test classes of a module of REBOUND's, by names of their own.
 

@@ -58,7 +58,7 @@ def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 for _module in MODULES:
-    _groups = adapted(_module, dict.fromkeys(THEIRS, {}), FAILS, steps=STEPS)
+    _groups = adapted(_module, {name: {} for name in THEIRS}, FAILS, steps=STEPS)
     for _group in _groups.values():
         for _name in vars(_group).keys() & {name.removeprefix(f"{_module}_") for name in SLOW}:
             setattr(_group, _name, pytest.mark.slow(getattr(_group, _name)))

@@ -11,10 +11,10 @@ rebound = pytest.importorskip("rebound")
 from .suite import adapted  # noqa: E402
 
 MODULES = (
-    "additional_forces", "boundary", "bs", "collisions", "copy", "gravity", "integrator", "megno", "mercurius",
-    "post_timestep_modifications", "saba", "simulation", "simulationarchive", "simulationarchive_matrix",
-    "trace", "trace_full_bs", "trace_full_ias15", "variational", "whfast", "whfast_advanced",
-    "whfast_testparticles",
+    "additional_forces", "boundary", "bs", "collisions", "copy", "gravity", "integrator", "megno",
+    "mercurius", "post_timestep_modifications", "saba", "simulation", "simulationarchive",
+    "simulationarchive_matrix", "trace", "trace_full_bs", "trace_full_ias15", "variational", "whfast",
+    "whfast_advanced", "whfast_testparticles",
 )  # fmt: skip
 ADAPTIVE = {"ias15": {"integrator.k": 16, "integrator.s": 8, "integrator.tol": 1e-12}}
 CHANCE = "asks for an energy error of 1e-14; rounding makes 1.9e-14 (rms), as it does below"

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.integrate import solve_ivp
+from scipy.integrate import OdeSolver, solve_ivp
 
 import integrators
 import problems
@@ -312,3 +312,52 @@ def test_a_larger_absolute_tolerance_takes_fewer_steps() -> None:
         for atol in (0.0, 1e-12, [1e-12, 1e-12], 1e-9)
     ]
     assert steps[0] > steps[1] == steps[2] > steps[3]
+
+
+def falls(t: float, y: np.ndarray) -> np.ndarray:
+    return np.array([y[1], -9.80665])
+
+
+def lands(t: float, y: np.ndarray) -> float:
+    return y[0]
+
+
+lands.terminal, lands.direction = True, -1  # type: ignore[attr-defined]
+PATHS = {"Python": falls, "numba": numba.njit(falls), "field": field(Opaque(numba.njit(falls), dim=2))}
+PATH = pytest.mark.parametrize("fun", PATHS.values(), ids=PATHS)
+TURN = 0.02 / 9.80665  # when a body thrown at 0.01 is back
+
+
+@PATH
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("options", [{}, {"k": 4, "s": 2, "h": 1e-3}], ids=["tolerance", "fixed"])
+def test_without_an_end_a_terminal_event_ends_the_integration(fun: Any, sign: float, options: Any) -> None:
+    solution = solve_ivp(
+        fun, (0.0, sign * np.inf), [0.0, sign * 0.01], method=HBVM, events=lands, dense_output=True, **options
+    )
+    assert solution.status == 1
+    assert solution.t_events[0][0] == pytest.approx(sign * TURN, rel=1e-12)  # measured 2e-16
+    assert solution.t[-1] == solution.t_events[0][0]
+
+
+@PATH
+@pytest.mark.parametrize("options", [{}, {"k": 4, "s": 2, "h": 0.1}], ids=["tolerance", "fixed"])
+def test_an_interval_without_length_gives_the_initial_state(fun: Any, options: Any) -> None:
+    every = {} if fun is falls else {"every": 10}
+    solution = solve_ivp(fun, (1.0, 1.0), [0.0, 0.01], method=HBVM, **every, **options)
+    assert solution.success
+    assert solution.t.tolist() == [1.0, 1.0]  # as SciPy's own methods
+    assert (solution.y.T == [0.0, 0.01]).all()
+
+
+@PATH
+def test_a_longest_step_below_the_spacing_of_times_is_scipys_failure(fun: Any) -> None:
+    solver = HBVM(fun, 5.0, [0.0, 0.01], 9.0, max_step=1e-20)
+    says = ""
+    while solver.status == "running":
+        says = solver.step()
+    assert solver.status == "failed"
+    assert OdeSolver.TOO_SMALL_STEP in says
+    at_0 = HBVM(fun, 0.0, [0.0, 0.01], 1.0, max_step=1e-20)  # there such a step can be told from none
+    assert at_0.step() is None
+    assert at_0.t == pytest.approx(1e-20)

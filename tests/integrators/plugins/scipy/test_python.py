@@ -158,3 +158,32 @@ def test_a_field_that_begins_as_a_staircase_of_rounding_takes_few_evaluations(at
     assert solution.status == 0
     assert solution.nfev < 20_000  # measured 11,024, 9,746 and 7,358
     assert abs(solution.y[0, -1] - exact.y[0, -1]) < 1e-11  # measured 1.1e-12
+
+
+def akzo(t: float, y: np.ndarray) -> np.ndarray:
+    """Medical Akzo Nobel, N = 40: most components are 0 at first, and stay there for a while."""
+    n = 40
+    wide, zeta = np.concatenate([[2.0 if t <= 5.0 else 0.0, 0.0], y, y[-2:]]), (np.arange(n) + 1) / n
+    u, v = wide[::2], wide[1::2]
+    first, second = 2 * (zeta - 1) ** 3 / 16, (zeta - 1) ** 4 / 16
+    out = np.empty(2 * n)
+    out[1::2] = -100.0 * u[1:-1] * v[1:-1]
+    out[::2] = first * (u[2:] - u[:-2]) * n / 2 + second * (u[:-2] - 2 * u[1:-1] + u[2:]) * n**2 + out[1::2]
+    return out
+
+
+def test_components_that_stay_zero_are_no_division_by_zero() -> None:
+    y0 = np.zeros(80)
+    y0[1::2] = 1.0
+    solution = solve_ivp(akzo, (0.0, 0.05), y0, method=HBVM)  # warnings are errors
+    assert solution.success
+
+
+def test_an_iteration_that_diverges_warns_of_nothing_and_errors_at_states_are_the_users() -> None:
+    solution = solve_ivp(lambda t, y: -1e3 * (np.exp(5.0 * y) - 1.0), (0.0, 1.0), [1.0], method=HBVM, s=3)
+    assert solution.success
+    assert abs(solution.y[0, -1]) < 1e-3  # measured
+    with pytest.warns(RuntimeWarning, match="invalid value encountered in sqrt"):
+        solve_ivp(lambda t, y: np.sqrt(y - 1.0), (0.0, 1.0), [0.5], method=HBVM)
+    with np.errstate(invalid="raise"), pytest.raises(FloatingPointError):
+        solve_ivp(lambda t, y: np.sqrt(y - 1.0), (0.0, 1.0), [0.5], method=HBVM)
