@@ -27,7 +27,10 @@ LIMITS = {
 }
 """Name of each limit: its size, and what it counts."""
 
-WRITTEN_OUT = "write long sums as m.sum(lambda i: q[i]**2, range(n)), or a field as a problems.Opaque"
+WRITTEN_OUT = (
+    "write sums as m.sum(lambda j: q[j]**2, range(n)), and the components of a field as "
+    "m.each(lambda i: -y[i], range(n)), which stay loops"
+)
 """What to do about too many operations."""
 
 

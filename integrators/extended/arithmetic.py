@@ -17,6 +17,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from problems import double_double
+from problems.emit.room import room
 from problems.trace.functions import WHOLE
 
 Numbers = NDArray[np.complex128]
@@ -228,6 +229,10 @@ class _Operators(ast.NodeTransformer):
 def compiled(text: str, name: str) -> Any:
     """Compile what `problems.emit.source` has printed for numba, for numbers instead of doubles."""
     tree = ast.fix_missing_locations(_Operators().visit(ast.parse(text)))
-    namespace: dict[str, Any] = {"np": np, **{function.__name__: function for function in FUNCTIONS}}
+    namespace: dict[str, Any] = {
+        "np": np,
+        "room": room,
+        **{function.__name__: function for function in FUNCTIONS},
+    }
     exec(compile(tree, "<field>", "exec"), namespace)  # noqa: S102 -- emitted from a graph
     return njit(namespace[name])

@@ -76,6 +76,14 @@ class _Printer(Fold[tuple[str, int]]):
     def visit_symbol(self, node: Node) -> tuple[str, int]:
         return self._symbol(node), _LEAF
 
+    def visit_entry(self, node: Node) -> tuple[str, int]:
+        return f"a_{{{_index(node.data[1], 1)}}}", _LEAF
+
+    def visit_element(self, node: Node, *_: tuple[str, int]) -> tuple[str, int]:
+        raise InputError(
+            f"a formula of {self.system.name} reads values that a loop makes: it is not one line."
+        )
+
     def visit_index(self, node: Node) -> tuple[str, int]:
         return _index(node.data, 0), _SUM
 

@@ -61,6 +61,9 @@ class _Degree(Fold[float | None]):
         absent = space == "par" and self._par is not None and isinstance(place, int) and not self._par[place]
         return _ZERO if absent else 0
 
+    def visit_element(self, node: Node, *degrees: float | None) -> float | None:
+        return None if None in degrees else max(d for d in degrees if d is not None)
+
     def visit_add(self, node: Node, a: float | None, b: float | None) -> float | None:
         return None if a is None or b is None else max(a, b)
 

@@ -93,6 +93,13 @@ class _Evaluation(Fold[Pieces | None]):
         assert node.loop is not None
         return [(0.0, node.data.values(node.loop).astype(np.float64))]
 
+    def visit_entry(self, node: Node) -> Pieces:
+        constants, place = node.data
+        return [(0.0, constants.values[place.values(node.loop)])]
+
+    def visit_element(self, node: Node, *_: Pieces | None) -> None:
+        return None
+
     def visit_symbol(self, node: Node) -> Pieces:
         space, place = node.data
         if space == "t":

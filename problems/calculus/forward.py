@@ -14,7 +14,8 @@ from collections.abc import Callable, Sequence
 from problems.calculus.function import Function, LoopTerm, Term
 from problems.trace.fold import Copy, Fold, shifted
 from problems.trace.functions import FUNCTIONS, Slope
-from problems.trace.graph import PAR, STATE, Graph, Loop, Node
+from problems.trace.graph import PAR, STATE, Graph, Node
+from problems.trace.loops import Loop, Stage
 
 
 def forward(
@@ -116,6 +117,7 @@ class Slopes(Fold[Node | None]):
     def __init__(self, values: Copy, active: int):
         super().__init__()
         self.values, self.graph, self.active = values, values.graph, active
+        self._stages: dict[Stage, Stage | None] = {}
 
     def of(self, root: Node) -> Node | None:
         self.values.of(root)
@@ -162,6 +164,14 @@ class Slopes(Fold[Node | None]):
 
     def visit_sum(self, node: Node, body: Node | None) -> Node | None:
         return None if body is None else self.graph.sum(body, self.graph.loop(node.data.rows))
+
+    def visit_element(self, node: Node, *_: Node | None) -> Node | None:
+        stage, place = node.data
+        if stage not in self._stages:
+            parts = stage.parts(lambda root: self.known[root.id], lambda loop: self.graph.loop(loop.rows))
+            self._stages[stage] = self.graph.stage(stage.size, *parts) if any(parts) else None
+        slope = self._stages[stage]
+        return None if slope is None else self.graph.element(slope, place, self.values.loop(node.loop))
 
     def visit_table(self, node: Node, a: Node | None) -> Node | None:
         return None if a is None else self.graph.table(self.at(node.args[0]), node.data.slope()) * a

@@ -19,7 +19,8 @@ from fractions import Fraction
 
 from problems.calculus.function import Function, LoopTerm, Term
 from problems.trace.functions import FUNCTIONS, Slope
-from problems.trace.graph import STATE, Graph, Loop, Node, is_power_of_two, reachable
+from problems.trace.graph import STATE, Graph, Node, is_power_of_two, reachable
+from problems.trace.loops import Affine, Loop, Place, Stage
 
 _ONE = Fraction(1)
 _SMALL = 2**20  # 2/3 is written 2*x/3; a quotient of long decimals is rounded once instead
@@ -115,14 +116,19 @@ class _Sweep:
         self.graph = root.graph
         self.nodes = reachable([root])
         self.parts: dict[int, list[_Adjoint]] = {}
+        self._stages: dict[Stage, list[tuple[Loop | None, Place, Node]]] = {}
+        self._owners: dict[int, list[Stage]] = {}  # stages by the nodes that they add up
         self._needed: set[int] = set()
         self._inverse: dict[int, Node] = {}
         self._survey()
 
     def _survey(self) -> None:
-        """Find the values that derivatives need anyway, and among them the reciprocals."""
+        """Find the values that derivatives need anyway, and among them the reciprocals; and the stages."""
+        for stage in dict.fromkeys(node.data[0] for node in self.nodes if node.op == "element"):
+            for root in dict.fromkeys(stage.roots):
+                self._owners.setdefault(root.id, []).append(stage)
         for node in self.nodes:
-            if not node.flags & STATE:
+            if not node.flags & STATE or node.op == "element":
                 continue
             if node.op == "mul":
                 a, b = node.args
@@ -150,6 +156,39 @@ class _Sweep:
     def _give(self, node: Node, part: _Adjoint) -> None:
         if node.flags & STATE and part.factor != 0:
             self.parts.setdefault(node.id, []).append(part)
+
+    def from_stages(self, node: Node) -> None:
+        """Give a node what the values of stages that it is a summand of are multiplied by.
+
+        All that reads a stage comes after its summands, so that the adjoints of its values are complete.
+        """
+        for stage in self._owners.get(node.id, ()):
+            adjoints = self._adjoints(stage)
+            if adjoints is None:
+                continue
+            for place, root in stage.terms:
+                if root is node:
+                    self._give(node, _Adjoint(_ONE, self.graph.element(adjoints, place, None), None, node.id))
+            for loop, entries in stage.loops:
+                for place, root in entries:
+                    if root is node:
+                        value = self.graph.element(adjoints, place, loop)
+                        self._give(node, _Adjoint(_ONE, value, None, node.id))
+
+    def _adjoints(self, stage: Stage) -> Stage | None:
+        """Return the adjoints of a stage's values, a stage themselves."""
+        given = self._stages.get(stage)
+        if not given:
+            return None
+        loops: dict[Loop, list[tuple[Affine, Node]]] = {}
+        terms: list[tuple[int, Node]] = []
+        for loop, place, node in given:
+            if isinstance(place, Affine) and loop is not None:
+                loops.setdefault(loop, []).append((place, node))
+            elif isinstance(place, int):
+                terms.append((place, node))
+        inside = tuple((loop, tuple(entries)) for loop, entries in loops.items())
+        return self.graph.stage(stage.size, inside, tuple(terms))
 
     def collected(self, node: Node) -> list[_Adjoint]:
         """Return the contributions to a node in the user's order, those from loops summed up."""
@@ -179,7 +218,7 @@ class _Sweep:
     def pull(self, node: Node, adjoint: _Adjoint) -> None:
         """Pass the adjoint of ``node`` on to its arguments."""
         graph, key = self.graph, node.id
-        active = [arg for arg in node.args if arg.flags & STATE]
+        active = [arg for arg in node.args if arg.flags & STATE] if node.op != "element" else []
         if len(active) > 1 and node.args[0] is not node.args[-1]:
             adjoint = adjoint.divided(graph)
         match node.op:
@@ -213,6 +252,9 @@ class _Sweep:
             case "sum":
                 adjoint = adjoint.divided(graph)
                 self._give(node.args[0], adjoint.scaled(_ONE, key))
+            case "element":
+                stage, place = node.data
+                self._stages.setdefault(stage, []).append((node.loop, place, adjoint.node(graph)))
             case "table":
                 (x,) = node.args
                 self._give(x, adjoint.times(graph.table(x, node.data.slope()), key))
@@ -264,6 +306,7 @@ def gradient(root: Node, dim: int) -> Function:
     sweep = _Sweep(root)
     sweep.parts[root.id] = [_Adjoint(_ONE, None, None, root.id)]
     for node in reversed(sweep.nodes):
+        sweep.from_stages(node)
         if not node.flags & STATE or node.id not in sweep.parts:
             continue
         parts = sweep.collected(node)

@@ -5,7 +5,9 @@ gives its row of the Jacobian, and with it which entries are not zero. Where
 summands stand in a loop, the loop's terms are differentiated once: the summand
 of term k at output a(k) has derivatives with respect to y[b(k)], which stand at
 the places (a(k), b(k)) for all k. The Jacobian stays a loop over the same list,
-with the places of its entries as further columns of the list.
+with the places of its entries as further columns of the list. Where the term reads an
+array that loops have filled, the loop is over all that meets there: a product of two
+sparse matrices, term by term.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,7 +19,8 @@ from numpy.typing import NDArray
 from problems.calculus.function import Function, LoopTerm, Term
 from problems.calculus.gradient import gradient
 from problems.trace.fold import Copy
-from problems.trace.graph import STATE, Affine, Graph, Loop, Node, Q, reachable
+from problems.trace.graph import STATE, Graph, Node, Q, reachable
+from problems.trace.loops import Affine, Loop, Stage
 
 Integers = NDArray[np.int64]
 
@@ -86,6 +89,7 @@ class _Entries:
         # Derivatives in a loop: that at [row, column] stands there for each term.
         self.loops: dict[Loop, dict[tuple[Affine, Affine], Node]] = {}
         self.too_large = False
+        self._stages: dict[Stage, _Entries] = {}
 
     def of_term(self, row: int, node: Node) -> None:
         """Enter the derivatives of a summand of one output."""
@@ -102,7 +106,7 @@ class _Entries:
         outside: dict[int, Node] = {}
 
         def captured(inner: Node) -> Node:
-            if inner.loop is not None or not inner.flags & STATE:
+            if not inner.flags & STATE or (inner.loop is not None and inner.op != "element"):
                 return inner
             outside[inner.id] = inner
             # As a symbol of the loop it keeps a derivative of its own in every term.
@@ -126,6 +130,9 @@ class _Entries:
 
     def _chain(self, loop: Loop, row: Affine, slope: Node, inner: Node) -> None:
         """Enter ``slope`` times the derivatives of ``inner``, which stands outside the loop."""
+        if inner.op == "element" and inner.loop is loop:
+            self._through(loop, row, slope, *inner.data)
+            return
         if inner.op == "symbol":
             self._enter(loop, row, _constant(loop, inner.data[1]), slope)
             return
@@ -135,6 +142,36 @@ class _Entries:
                 self._enter(loop, row, _constant(loop, column), slope * term.node)
         for other, terms in slopes.loops:
             self._product(loop, row, slope, other, terms)
+
+    def _through(self, loop: Loop, row: Affine, slope: Node, stage: Stage, place: Affine) -> None:
+        """Enter ``slope`` times the derivatives of a stage's values: a loop over what meets at each value."""
+        if stage not in self._stages:
+            self._stages[stage] = _Entries(self.graph, self.size)
+            for other, terms in stage.loops:
+                for at, node in terms:
+                    self._stages[stage].of_loop_term(other, at, node)
+            for at, node in stage.terms:
+                self._stages[stage].of_term(at, node)
+        inner, read = self._stages[stage], place.values(loop)
+        self.too_large |= inner.too_large
+        for (at, column), nodes in inner.plain.items():
+            some = self.graph.loop(loop.rows[read == at])
+            for node in nodes if len(some) else ():
+                product = _moved(self.graph, slope, loop, some, 0) * node
+                self._enter(some, row, _constant(some, column), product)
+        for other, entries in inner.loops.items():
+            for (at, column), node in entries.items():
+                first, second = _meeting(read, at.values(other))
+                both = _child(other, loop, first, second)
+                shift = 0 if both is other else loop.width
+                if both is None:
+                    if first.size * (loop.width + other.width) > LARGEST:
+                        self.too_large = True
+                        return
+                    both = self.graph.loop(np.hstack([loop.rows[first], other.rows[second]]))
+                left = _moved(self.graph, slope, loop, both, 0)
+                right = node if both is other else _moved(self.graph, node, other, both, shift)
+                self._enter(both, row.widened(both.width), column.widened(both.width, shift), left * right)
 
     def _product(self, loop: Loop, row: Affine, slope: Node, other: Loop, terms: Sequence[LoopTerm]) -> None:
         """Enter products of a term of each of two loops: a loop over all pairs of terms."""
@@ -147,8 +184,8 @@ class _Entries:
         left = _moved(self.graph, slope, loop, both, 0)
         for term in terms:
             right = _moved(self.graph, term.node, other, both, loop.width)
-            column = _widened(term.index, both, loop.width)
-            self._enter(both, _widened(row, both, 0), column, left * right)
+            column = term.index.widened(both.width, loop.width)
+            self._enter(both, row.widened(both.width), column, left * right)
 
     def _enter(self, loop: Loop, row: Affine, column: Affine, node: Node) -> None:
         nodes = self.loops.setdefault(loop, {})
@@ -189,11 +226,20 @@ def _constant(loop: Loop, place: int) -> Affine:
     return Affine((0,) * loop.width, place)
 
 
-def _widened(affine: Affine, loop: Loop, at: int) -> Affine:
-    """Return an index into the columns of ``loop`` from ``at`` on."""
-    coefficients = [0] * loop.width
-    coefficients[at : at + len(affine.coefficients)] = affine.coefficients
-    return Affine(tuple(coefficients), affine.offset)
+def _meeting(read: Integers, filled: Integers) -> tuple[Integers, Integers]:
+    """Return the pairs (i, j) with ``read[i] == filled[j]``."""
+    order = np.argsort(filled, kind="stable")
+    low, high = (np.searchsorted(filled[order], read, side=side) for side in ("left", "right"))
+    first = np.repeat(np.arange(read.size), high - low)
+    within = np.arange(first.size) - np.repeat(np.cumsum(high - low) - (high - low), high - low)
+    return first, order[np.repeat(low, high - low) + within]
+
+
+def _child(other: Loop, loop: Loop, first: Integers, second: Integers) -> Loop | None:
+    """Return the other loop if it is inside of ``loop``, and each of its terms meets the one around it."""
+    alike = second.size == len(other) and other.width >= loop.width
+    inside = alike and np.array_equal(second, np.arange(second.size))
+    return other if inside and np.array_equal(other.rows[:, : loop.width], loop.rows[first]) else None
 
 
 class _Replaced(Copy):
@@ -205,7 +251,7 @@ class _Replaced(Copy):
 
     def of(self, root: Node) -> Node:
         for node in reachable([root], self._loop):
-            results = [self._of_argument(arg) for arg in node.args]
+            results = [self._of_argument(arg) for arg in node.reads]
             self.known[node.id] = self.visit(node, results)
         return self._of_argument(root)
 
@@ -215,7 +261,10 @@ class _Replaced(Copy):
     def visit_symbol(self, node: Node) -> Node:
         return self._leaf(node)
 
-    visit_index = visit_symbol
+    visit_index = visit_entry = visit_symbol
+
+    def visit_element(self, node: Node, *_: Node) -> Node:
+        return self._leaf(node)
 
 
 def _copied(graph: Graph, root: Node, loop: Loop, leaf: Callable[[Node], Node]) -> Node:
@@ -230,8 +279,11 @@ def _moved(graph: Graph, root: Node, loop: Loop, to: Loop, at: int) -> Node:
         if node.loop is None:
             return node
         if node.op == "index":
-            return graph.index(_widened(node.data, to, at), to)
-        space, place = node.data
-        return graph.symbol(space, _widened(place, to, at), flags=node.flags, loop=to)
+            return graph.index(node.data.widened(to.width, at), to)
+        source, place = node.data
+        place = place.widened(to.width, at)
+        if node.op == "symbol":
+            return graph.symbol(source, place, flags=node.flags, loop=to)
+        return graph.entry(source, place, to) if node.op == "entry" else graph.element(source, place, to)
 
     return _copied(graph, root, loop, leaf)

@@ -34,7 +34,6 @@ from problems.trace.graph import reachable
 _WRITERS = {"numpy": numpy_text, "numba": numba_text, "jax": jax_text, "heyoka": heyoka_text}
 BACKENDS = tuple(_WRITERS)
 LONG, PER_SECOND = 3000, 400  # operations of a field of which its writer is told; compiled in a second, about
-_COST = {name: function.cost for name, function in FUNCTIONS.items()} | {"table": SLOW}
 _CALLED = sorted({f.numba.partition("(")[0] for f in FUNCTIONS.values()} - {""})
 _ARRAYS = [name for name in _CALLED if name == "floor" or not hasattr(math, name)]  # math.floor is an integer
 _MATHEMATICS = {name: getattr(np if name in _ARRAYS else math, name) for name in _CALLED}
@@ -60,11 +59,14 @@ class Source:
         The function's name.
     sha256 : str
         Hash of the text.
+    cost : int
+        Additions that take as long to compile.
     """
 
     text: str
     name: str
     sha256: str
+    cost: int = 0
 
 
 Quantity = str | Function | Jacobian
@@ -123,8 +125,9 @@ def _function(system: System, quantity: Quantity) -> Function:
 
 
 def _written(function: Function, name: str, backend: str, limit: int | None) -> Source:
-    text = _WRITERS[backend](make_plan(function, limit=limit), name)
-    return Source(text, name, hashlib.sha256(text.encode()).hexdigest())
+    plan = make_plan(function, limit=limit)
+    text = _WRITERS[backend](plan, name)
+    return Source(text, name, hashlib.sha256(text.encode()).hexdigest(), plan.cost)
 
 
 def fingerprint(system: System) -> str:
@@ -170,7 +173,9 @@ def numpy_of(function: Function, name: str, *, limit: int | None = SMALL) -> Cal
 def numba_of(function: Function, name: str) -> tuple[str, Callable[..., Any]]:
     """Return the source of such a function for numba, and it as a Python function that numba can compile."""
     emitted = _written(function, name, "numba", SMALL)
-    namespace: dict[str, Any] = {"np": np, **_MATHEMATICS}
+    from problems.emit.room import room  # which loads numba
+
+    namespace: dict[str, Any] = {"np": np, "room": room, **_MATHEMATICS}
     return emitted.text, _executed(emitted, namespace)
 
 
@@ -235,13 +240,14 @@ def numba(system: System, quantity: Quantity, *, limit: int | None = SMALL) -> A
         if cost >= LONG:
             warnings.warn(
                 f"the {function.name} of {system.name} is {cost:,} operations written out, compiled "
-                f"for about {cost / PER_SECOND:.0f} s; write sums as m.sum(lambda i: q[i]**2, range(n)), "
-                "which takes about one.",
+                f"for about {cost / PER_SECOND:.0f} s; write loops as m.sum(lambda i: q[i]**2, range(n)) or "
+                "m.each(lambda i: ..., range(n)), which takes about one.",
                 stacklevel=2,
             )
         cut = emitted.text.index(f"def {emitted.name}(")
         decorator = '@numba.njit(cache=True, error_model="numpy")\n'
-        text = _NUMBA_HEAD + emitted.text[:cut] + "\n" + decorator + emitted.text[cut:]
+        head = _NUMBA_HEAD + ("from problems.emit.room import room\n\n" if "room(out" in emitted.text else "")
+        text = head + emitted.text[:cut] + "\n" + decorator + emitted.text[cut:]
         _compiled[key] = getattr(cache.module(text, emitted.name), emitted.name)
     return _compiled[key]
 
@@ -258,7 +264,7 @@ def compilable(system: System, quantity: Quantity) -> int:
     """
     function = _function(system, quantity)
     nodes = reachable(function.roots)
-    cost = sum(_COST.get(node.op, 1) for node in nodes)
+    cost = source(system, function, "numba").cost
     name = f"the {function.name} of {system.name}"
     limits.check(f"{name}, with each sine or exponential as {SLOW},", "OPERATIONS", cost, limits.WRITTEN_OUT)
     depth: dict[int, int] = {}

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from problems.emit.plan import Plan, Scatter
+from problems.emit.plan import Fill, Plan, Scatter
 from problems.emit.printer import Printer
 from problems.trace.functions import FUNCTIONS
 from problems.trace.graph import Affine, Loop, Node
@@ -48,35 +48,46 @@ class _ArrayPrinter(Printer):
 
     def write(self) -> None:
         if self.plan.scatters:
-            self.start()
+            self.start("out", self.plan.n_out)
         self.statements(self.plan.first)
         for scatter in self.plan.scatters:
-            self._scatter(scatter)
+            self._scatter("out", scatter)
         self.statements(self.plan.last)
 
-    def _scatter(self, scatter: Scatter) -> None:
+    def fill(self, fill: Fill) -> None:
+        self.start(fill.name, fill.size)
+        for scatter in fill.scatters:
+            self._scatter(fill.name, scatter)
+        for place, node, added in fill.terms:
+            value = self.text(node, 2 if added else 1)
+            self.put(fill.name, str(place), f"{fill.name}[{place}] + {value}" if added else value)
+
+    def _scatter(self, array: str, scatter: Scatter) -> None:
         for node in scatter.body:
             self._inside(node, scatter.loop)
         shared = []
         for entry, unique in zip(scatter.entries, scatter.unique, strict=True):
             if unique:
-                self.put(self._places(entry.index, scatter.loop), self.text(entry.node))
+                self.put(array, self._places(entry.index, scatter.loop), self.text(entry.node))
             else:
                 shared.append(entry)
         if shared:
             # Row by row, so that each output receives its summands in the order of the loop.
             places = np.stack([entry.index.values(scatter.loop) for entry in shared], axis=1).ravel()
             values = [self.text(entry.node) for entry in shared]
-            self.accumulate(self._table(places), values, len(scatter.loop))
+            self.accumulate(array, self._table(places), values, len(scatter.loop))
+
+    def entry(self, name: str, place: str) -> str:
+        return f"{self.array(name)}[{place}].reshape((-1,) + (1,)*(y.ndim - 1))"
 
     # What differs between the two libraries.
-    def start(self) -> None:
+    def start(self, array: str, size: int) -> None:
         raise NotImplementedError
 
-    def put(self, places: str, value: str) -> None:
+    def put(self, array: str, places: str, value: str) -> None:
         raise NotImplementedError
 
-    def accumulate(self, places: str, values: list[str], n: int) -> None:
+    def accumulate(self, array: str, places: str, values: list[str], n: int) -> None:
         raise NotImplementedError
 
     def reduced(self, value: str, n: int) -> str:
@@ -87,18 +98,21 @@ class _NumpyPrinter(_ArrayPrinter):
     def store(self, place: int, value: str) -> None:
         self.line(f"out[{place}] = {value}")
 
-    def start(self) -> None:
-        self.line("out[...] = -0.0")
+    def start(self, array: str, size: int) -> None:
+        room = "" if array == "out" else f"np.empty(({size},) + y.shape[1:], y.dtype)"
+        if room:
+            self.line(f"{array} = {room}")
+        self.line(f"{array}[...] = -0.0")
 
-    def put(self, places: str, value: str) -> None:
-        self.line(f"out[{places}] = {value}")
+    def put(self, array: str, places: str, value: str) -> None:
+        self.line(f"{array}[{places}] = {value}")
 
-    def accumulate(self, places: str, values: list[str], n: int) -> None:
+    def accumulate(self, array: str, places: str, values: list[str], n: int) -> None:
         shape = f"({n},) + y.shape[1:]"
         rows = ", ".join(f"np.broadcast_to({value}, {shape})" for value in values)
         # np.add.at adds one row after the other, as a loop would.
         self.line(f"rows = np.stack(({rows},), axis=1).reshape((-1,) + y.shape[1:])")
-        self.line(f"np.add.at(out, {places}, rows)")
+        self.line(f"np.add.at({array}, {places}, rows)")
 
     def reduced(self, value: str, n: int) -> str:
         # cumsum adds one after the other; np.sum would add pairwise.
@@ -119,15 +133,15 @@ class _JaxPrinter(_ArrayPrinter):
         else:
             self.outputs[place] = value
 
-    def start(self) -> None:
-        self.line(f"out = jnp.full({self.plan.n_out}, -0.0)")
+    def start(self, array: str, size: int) -> None:
+        self.line(f"{array} = jnp.full({size}, -0.0)")
 
-    def put(self, places: str, value: str) -> None:
-        self.line(f"out = out.at[{places}].set({value})")
+    def put(self, array: str, places: str, value: str) -> None:
+        self.line(f"{array} = {array}.at[{places}].set({value})")
 
-    def accumulate(self, places: str, values: list[str], n: int) -> None:
+    def accumulate(self, array: str, places: str, values: list[str], n: int) -> None:
         rows = ", ".join(f"jnp.broadcast_to({value}, ({n},))" for value in values)
-        self.line(f"out = out.at[{places}].add(jnp.stack(({rows},), axis=1).ravel())")
+        self.line(f"{array} = {array}.at[{places}].add(jnp.stack(({rows},), axis=1).ravel())")
 
     def reduced(self, value: str, n: int) -> str:
         return f"jnp.sum(jnp.broadcast_to({value}, ({n},)))"

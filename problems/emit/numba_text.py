@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from problems.emit.loops import Nest, Range, Table, nest, ranges
-from problems.emit.plan import Plan, Scatter
+from problems.emit.plan import Fill, Plan, Scatter
 from problems.emit.printer import Printer, variable
 from problems.trace.functions import FUNCTIONS
 from problems.trace.graph import Affine, Loop, Node
@@ -14,19 +14,34 @@ _FUNCTIONS = {name: f.numba for name, f in FUNCTIONS.items()} | {"where": "({1} 
 
 
 class _NumbaPrinter(Printer):
+    target = "out"  # the array that loops fill
+
     def write(self) -> None:
         self.statements(self.plan.first)
-        for places in _runs(self.plan.zeros):
+        self._loops(self.plan.zeros, self.plan.scatters)
+        self.statements(self.plan.last)
+
+    def _loops(self, zeros: list[int], scatters: Sequence[Scatter]) -> None:
+        """Print the loops that fill an array."""
+        for places in _runs(zeros):
             # -0.0 is what leaves the first summand as it is, its sign included.
             if len(places) <= 3:
                 for place in places:
-                    self.line(f"out[{place}] = -0.0")
+                    self.line(f"{self.target}[{place}] = -0.0")
             else:
                 self.line(f"for k in {places}:")
-                self.line("    out[k] = -0.0")
-        for scatter in self.plan.scatters:
+                self.line(f"    {self.target}[k] = -0.0")
+        for scatter in scatters:
             self._loop(scatter.loop, scatter.body, scatter)
-        self.statements(self.plan.last)
+
+    def fill(self, fill: Fill) -> None:
+        self.line(f"{fill.name} = room(out, {fill.size})")
+        self.target = fill.name
+        self._loops(fill.zeros, fill.scatters)
+        for place, node, added in fill.terms:
+            value = self.text(node, 2 if added else 1)
+            self.line(f"{fill.name}[{place}] = " + (f"{fill.name}[{place}] + " if added else "") + value)
+        self.target = "out"
 
     def store(self, place: int, value: str) -> None:
         self.line(f"out[{place}] = {value}")
@@ -78,7 +93,9 @@ class _NumbaPrinter(Printer):
         if isinstance(header, Range) and isinstance(target, Scatter) and header.n > 1:
             carried = _carried(header, target)
             for i in carried:
-                self.line(f"{variable('summed', i)} = out[{header.along(target.entries[i].index).offset}]")
+                self.line(
+                    f"{variable('summed', i)} = {self.target}[{header.along(target.entries[i].index).offset}]"
+                )
         opening = header.opening()
         for line in opening:
             self.line(line)
@@ -94,7 +111,7 @@ class _NumbaPrinter(Printer):
             for first, second in carried.items():
                 along = header.along(target.entries[second].index)
                 last = along.offset + along.coefficients[0] * (header.n - 1)
-                self.line(f"out[{last}] = {variable('summed', first)}")
+                self.line(f"{self.target}[{last}] = {variable('summed', first)}")
 
     def _nested(self, header: Nest, body: Sequence[Node], target: Scatter | Node) -> None:
         """Print two nested loops; what depends on i alone stays out of the inner one, sums too."""
@@ -110,7 +127,7 @@ class _NumbaPrinter(Printer):
                     self.assign(node, self.text(node))
         entries = target.entries if isinstance(target, Scatter) else ()
         for i in held:
-            self.line(f"{variable('summed', i)} = out[{header.index(entries[i].index)}]")
+            self.line(f"{variable('summed', i)} = {self.target}[{header.index(entries[i].index)}]")
         self.line(f"for j in {header.inner}:")
         self.indent = outside + "        "
         for node in body:
@@ -120,7 +137,7 @@ class _NumbaPrinter(Printer):
         self._add_to(target, header, variables, variables)
         self.indent = outside + "    "
         for i in held:
-            self.line(f"out[{header.index(entries[i].index)}] = {variable('summed', i)}")
+            self.line(f"{self.target}[{header.index(entries[i].index)}] = {variable('summed', i)}")
         self.indent = outside
 
     def _add_to(
@@ -142,7 +159,7 @@ class _NumbaPrinter(Printer):
         # What uses a variable that goes from one term to the next comes before what renews it.
         for i in sorted(range(len(target.entries)), key=lambda i: i not in before or i in after):
             node = target.entries[i].node
-            place = f"out[{header.index(target.entries[i].index)}]"
+            place = f"{self.target}[{header.index(target.entries[i].index)}]"
             now, to = before.get(i, place), after.get(i, place)
             if target.unique[i] and now == to == place:
                 self.line(f"{place} = {self.text(node)}")
@@ -157,8 +174,8 @@ def _outer(body: Sequence[Node]) -> set[int]:
     outer: set[int] = set()
     inside = {node.id for node in body}
     for node in body:
-        if node.op in ("symbol", "index"):
-            affine: Affine = node.data[1] if node.op == "symbol" else node.data
+        if node.op in ("symbol", "index", "entry", "element"):
+            affine: Affine = node.data if node.op == "index" else node.data[1]
             alone = affine.coefficients[1] == 0
         else:
             alone = all(arg.id in outer for arg in node.args if arg.id in inside)

@@ -12,10 +12,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from problems.calculus.function import Function, LoopTerm, Term
-from problems.trace.graph import Graph, Loop, Node, reachable
+from problems.trace.functions import FUNCTIONS, SLOW
+from problems.trace.graph import Graph, Node, reachable
+from problems.trace.loops import Loop, Stage
 
 # Loops of at most this many operations in all are written out: 15 pairs of bodies are, 45 are not.
 SMALL = 700
+MANY = 4000  # operations of small loops, all together, beyond which they stay loops
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +62,43 @@ class Scatter:
     unique: tuple[bool, ...]
 
 
+@dataclass(frozen=True, eq=False)
+class Fill:
+    """An array of intermediate values, to be filled by loops and then by single summands.
+
+    Attributes
+    ----------
+    name : str
+        What it is called.
+    size : int
+        Number of values.
+    zeros : list of int
+        Those that start from (negative) zero.
+    scatters : list of Scatter
+        The loops.
+    terms : list of (int, Node, bool)
+        Further summands: the place, the node, and whether it is added to what is there.
+    """
+
+    name: str
+    size: int
+    zeros: "list[int]"
+    scatters: "list[Scatter]"
+    terms: "list[tuple[int, Node, bool]]"
+
+
+Statement = Let | Reduce | Store | Fill
+
+
+def array_of(stage: Stage) -> str:
+    """Return what the array of a stage is called."""
+    return f"w{stage.id}"
+
+
+COST = {name: function.cost for name, function in FUNCTIONS.items()} | {"table": SLOW}
+LOOP = 25  # additions that take as long to compile as a loop
+
+
 @dataclass
 class Plan:
     """Statements in order.
@@ -80,12 +120,27 @@ class Plan:
     """
 
     n_out: int
-    first: list[Let | Reduce | Store] = field(default_factory=list)
+    first: list[Statement] = field(default_factory=list)
     zeros: list[int] = field(default_factory=list)
     scatters: list[Scatter] = field(default_factory=list)
-    last: list[Let | Reduce | Store] = field(default_factory=list)
+    last: list[Statement] = field(default_factory=list)
     uses: Counter[int] = field(default_factory=Counter)
     spare: dict[int, int] = field(default_factory=dict)
+
+    @property
+    def cost(self) -> int:
+        """Additions that take as long to compile."""
+        scatters = [*self.scatters]
+        total = 0
+        for statement in self.first + self.last:
+            match statement:
+                case Let(node):
+                    total += COST.get(node.op, 1)
+                case Reduce(_, _, body):
+                    total += LOOP + sum(COST.get(node.op, 1) for node in body)
+                case Fill():
+                    scatters += statement.scatters
+        return total + sum(LOOP + sum(COST.get(n.op, 1) for n in scatter.body) for scatter in scatters)
 
 
 class _Expansion:
@@ -95,14 +150,61 @@ class _Expansion:
         self.graph = graph
         self.limit = limit
         self.done: dict[int, Node] = {}
+        self._stages: dict[Stage, Stage] = {}
+        self._values: dict[Stage, list[Node]] = {}
         nodes = reachable(roots)
+        self.whole = limit is None or not any(node.op == "element" for node in nodes)
+        if not self.whole and limit is not None and _size(nodes) <= limit:
+            self.whole, self.limit = True, None
+        if self.whole and limit is not None and _written(nodes, limit) > MANY:
+            self.whole = False
         self._uses = Counter(root.id for root in roots)
         self._uses.update(arg.id for node in nodes for arg in node.args)
         for node in nodes:
             if node.loop is None:
-                self.done[node.id] = self._sum(node) if node.op == "sum" else self._apply(node, self.done)
+                self.done[node.id] = self._outside(node)
+
+    def _outside(self, node: Node) -> Node:
+        if node.op == "sum":
+            return self._sum(node)
+        if node.op == "element":
+            stage, place = node.data
+            return (
+                self.values(stage)[place]
+                if self.whole
+                else self.graph.element(self.stage(stage), place, None)
+            )
+        return self._apply(node, self.done)
+
+    def stage(self, stage: Stage) -> Stage:
+        """Return a stage whose loops stay loops, their nodes rewritten."""
+        if stage not in self._stages:
+            loops = []
+            for loop, entries in stage.loops:
+                inside = self.inside([node for _, node in entries], loop)
+                places = [place for place, _ in entries]
+                loops.append((loop, tuple(zip(places, inside, strict=True))))
+            terms = tuple((place, self.done[node.id]) for place, node in stage.terms)
+            self._stages[stage] = self.graph.stage(stage.size, tuple(loops), terms)
+        return self._stages[stage]
+
+    def values(self, stage: Stage) -> list[Node]:
+        """Return the values of a stage that is written out."""
+        if stage not in self._values:
+            chains: list[list[Node]] = [[] for _ in range(stage.size)]
+            for loop, entries in stage.loops:
+                places = [place.values(loop) for place, _ in entries]
+                for k, nodes in enumerate(self.written_out([node for _, node in entries], loop)):
+                    for place, node in zip(places, nodes, strict=True):
+                        chains[int(place[k])].append(node)
+            for place, node in stage.terms:
+                chains[place].append(self.done[node.id])
+            self._values[stage] = [_added(chain, self.graph) for chain in chains]
+        return self._values[stage]
 
     def small(self, loop: Loop, roots: Sequence[Node]) -> bool:
+        if not self.whole:
+            return False
         # A root that does not vary in the loop still stands in each of its terms.
         operations = max(len(reachable(roots, loop)), len(roots))
         return self.limit is None or len(loop) * operations <= self.limit
@@ -129,13 +231,18 @@ class _Expansion:
         """Rewrite nodes inside a loop that stays one."""
         done: dict[int, Node] = {}
         for node in reachable(roots, loop):
-            done[node.id] = node if node.op in ("symbol", "index") else self._apply(node, done)
+            if node.op in ("symbol", "index", "entry"):
+                done[node.id] = node
+            elif node.op == "element":
+                done[node.id] = self.graph.element(self.stage(node.data[0]), node.data[1], loop)
+            else:
+                done[node.id] = self._apply(node, done)
         return [done[root.id] if root.id in done else self.done[root.id] for root in roots]
 
     def written_out(self, roots: Sequence[Node], loop: Loop) -> list[list[Node]]:
         """Return the roots at every term of a loop."""
         body = reachable(roots, loop)
-        places = {n.id: n.data[1].values(loop) for n in body if n.op == "symbol"}
+        places = {n.id: n.data[1].values(loop) for n in body if n.op in ("symbol", "entry", "element")}
         places |= {n.id: n.data.values(loop) for n in body if n.op == "index"}
         rows: list[list[Node]] = []
         for k in range(len(loop)):
@@ -144,12 +251,37 @@ class _Expansion:
                 if node.op == "symbol":
                     place = int(places[node.id][k])
                     done[node.id] = self.graph.symbol(node.data[0], place, flags=node.flags)
+                elif node.op == "entry":
+                    done[node.id] = self.graph.const(float(node.data[0].values[places[node.id][k]]))
+                elif node.op == "element":
+                    done[node.id] = self.values(node.data[0])[places[node.id][k]]
                 elif node.op == "index":
                     done[node.id] = self.graph.const(float(places[node.id][k]))
                 else:
                     done[node.id] = self._apply(node, done)
             rows.append([done[root.id] if root.id in done else self.done[root.id] for root in roots])
         return rows
+
+
+def _added(chain: list[Node], graph: Graph) -> Node:
+    return sum(chain[1:], chain[0]) if chain else graph.const(0.0)
+
+
+def _size(nodes: Sequence[Node]) -> int:
+    """Return how many operations nodes are where all loops are written out."""
+    total = 0
+    for node in nodes:
+        total += 1 if node.loop is None else len(node.loop)
+    for stage in {node.data[0] for node in nodes if node.op == "element"}:
+        total += sum(len(loop) * len(entries) for loop, entries in stage.loops) + len(stage.terms)
+    return total
+
+
+def _written(nodes: Sequence[Node], limit: int) -> int:
+    """Return how many operations the small sums are together where they are written out."""
+    sums = ((node.data, node.args) for node in nodes if node.op == "sum")
+    each = (len(loop) * max(len(reachable(roots, loop)), 1) for loop, roots in sums)
+    return sum(size for size in each if size <= limit)
 
 
 def written_out(function: Function) -> list[Node]:
@@ -163,7 +295,7 @@ def written_out(function: Function) -> list[Node]:
                 terms_of[int(place[k])].append(node)
     for nodes, terms in zip(terms_of, function.outputs, strict=True):
         nodes.extend(expansion.done[term.node.id] for term in terms)
-    return [sum(nodes[1:], nodes[0]) if nodes else function.graph.const(0.0) for nodes in terms_of]
+    return [_added(nodes, function.graph) for nodes in terms_of]
 
 
 def make_plan(function: Function, *, limit: int | None = SMALL) -> Plan:
@@ -204,7 +336,7 @@ def make_plan(function: Function, *, limit: int | None = SMALL) -> Plan:
     return plan
 
 
-def _scatters(plan: Plan, kept: list[tuple[Loop, list[LoopTerm]]]) -> set[int]:
+def _scatters(plan: Plan, kept: Sequence[tuple[Loop, Sequence[LoopTerm]]]) -> set[int]:
     hits = np.zeros(plan.n_out, dtype=np.int64)
     for loop, entries in kept:
         for entry in entries:
@@ -240,14 +372,15 @@ def _schedule(plan: Plan, finals: list[tuple[int, Node]], hints: list[Node]) -> 
     outputs: dict[int, list[int]] = {}
     for place, node in finals:
         outputs.setdefault(node.id, []).append(place)
-    done: set[int] = set()
-    captured = [
-        arg for scatter in plan.scatters for node in scatter.body for arg in node.args if arg.loop is None
-    ] + [e.node for scatter in plan.scatters for e in scatter.entries if e.node.loop is None]
+    done: set[int | Stage] = set()
+    captured = _captured(plan.scatters)
 
-    def emit(roots: Sequence[Node], statements: list[Let | Reduce | Store]) -> None:
+    def emit(roots: "Sequence[Node | Stage]", statements: list[Statement]) -> None:
         for root in roots:
             for node in _demanded(root, done):
+                if isinstance(node, Stage):
+                    statements.append(_filled(node))
+                    continue
                 if node.op == "sum":
                     statements.append(Reduce(node, node.data, tuple(reachable(node.args, node.data))))
                 else:
@@ -257,7 +390,7 @@ def _schedule(plan: Plan, finals: list[tuple[int, Node]], hints: list[Node]) -> 
 
     if plan.scatters:
         # Sums first: they need an output that is not in use yet.
-        captured += [n for n in reachable([node for _, node in finals]) if n.op == "sum"]
+        captured += [n for n in reachable([node for _, node in finals]) if n.op == "sum" and n.loop is None]
     emit(captured, plan.first)
     needed = {node.id for node in reachable([node for _, node in finals])}
     emit([node for node in hints if node.id in needed] + [node for _, node in finals], plan.last)
@@ -273,7 +406,11 @@ def _schedule(plan: Plan, finals: list[tuple[int, Node]], hints: list[Node]) -> 
     uses = plan.uses
     for statement in plan.first + plan.last:
         if isinstance(statement, Let):
-            uses.update(arg.id for arg in statement.node.args)
+            uses.update(arg.id for arg in statement.node.reads)
+        elif isinstance(statement, Fill):
+            for scatter in statement.scatters:
+                _count_body(uses, scatter.body, [entry.node for entry in scatter.entries])
+            uses.update(node.id for _, node, _ in statement.terms)
         elif isinstance(statement, Store):
             uses[statement.node.id] += 1
         else:
@@ -283,28 +420,64 @@ def _schedule(plan: Plan, finals: list[tuple[int, Node]], hints: list[Node]) -> 
 
 
 def _count_body(uses: Counter[int], body: Sequence[Node], roots: Sequence[Node]) -> None:
-    for arg in [arg for node in body for arg in node.args] + list(roots):
+    for arg in [arg for node in body for arg in node.reads] + list(roots):
         # What a loop takes from outside is computed once, before the loop.
         uses[arg.id] += 1 if arg.loop is not None else 2
 
 
-def _demanded(root: Node, done: set[int]) -> list[Node]:
+def _outside(body: Sequence[Node], roots: Sequence[Node]) -> "list[Node | Stage]":
+    """Return what the terms of a loop take from outside."""
+    needed: list[Node | Stage] = []
+    for node in body:
+        needed += [node.data[0]] if node.op == "element" else [arg for arg in node.args if arg.loop is None]
+    return needed + [root for root in roots if root.loop is None]
+
+
+def _captured(scatters: Sequence[Scatter]) -> "list[Node | Stage]":
+    roots = [entry.node for scatter in scatters for entry in scatter.entries if entry.node.loop is None]
+    bodies = [outer for scatter in scatters for outer in _outside(scatter.body, ())]
+    return bodies + roots
+
+
+def _filled(stage: Stage) -> Fill:
+    plan = Plan(stage.size)
+    covered = _scatters(
+        plan, [(loop, [LoopTerm(place, node) for place, node in entries]) for loop, entries in stage.loops]
+    )
+    terms: list[tuple[int, Node, bool]] = []
+    for place, node in stage.terms:
+        terms.append((place, node, place in covered))
+        covered.add(place)
+    zeros = sorted({*plan.zeros, *(place for place in range(stage.size) if place not in covered)})
+    return Fill(array_of(stage), stage.size, zeros, plan.scatters, terms)
+
+
+def _needed(item: "Node | Stage") -> "Sequence[Node | Stage]":
+    """Return what a value, or an array, is calculated from."""
+    if isinstance(item, Stage):
+        needed: list[Node | Stage] = []
+        for loop, entries in item.loops:
+            roots = [node for _, node in entries]
+            needed += _outside(reachable(roots, loop), roots)
+        return needed + [node for _, node in item.terms]
+    if item.op == "element":
+        return [item.data[0]]
+    return _outside(reachable(item.args, item.data), item.args) if item.op == "sum" else item.args
+
+
+def _demanded(root: "Node | Stage", done: "set[int | Stage]") -> "list[Node | Stage]":
     """Return what ``root`` needs and is not done yet, arguments first, depth first."""
-    ordered: list[Node] = []
-    stack: list[tuple[Node, bool]] = [(root, False)]
+    ordered: list[Node | Stage] = []
+    stack: list[tuple[Node | Stage, bool]] = [(root, False)]
     while stack:
-        node, ready = stack.pop()
-        if node.id in done:
+        item, ready = stack.pop()
+        key = item if isinstance(item, Stage) else item.id
+        if key in done:
             continue
         if ready:
-            done.add(node.id)
-            ordered.append(node)
+            done.add(key)
+            ordered.append(item)
             continue
-        stack.append((node, True))
-        if node.op == "sum":
-            inner = reachable(node.args, node.data)
-            needed = [arg for n in inner for arg in n.args if arg.loop is None]
-        else:
-            needed = list(node.args)
-        stack.extend((arg, False) for arg in reversed(needed) if arg.id not in done)
+        stack.append((item, True))
+        stack.extend((arg, False) for arg in reversed(_needed(item)))
     return ordered

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 
-from problems.emit.plan import Let, Plan, Reduce, Store
+from problems.emit.plan import Fill, Let, Plan, Reduce, Statement, Store, array_of
 from problems.trace.arithmetic import ARITHMETIC, LEAF, SUM
 from problems.trace.graph import Affine, Loop, Node
 
@@ -59,7 +59,11 @@ class Printer:
         """Print a declared sum."""
         raise NotImplementedError
 
-    def statements(self, statements: Sequence[Let | Reduce | Store]) -> None:
+    def fill(self, fill: Fill) -> None:
+        """Print how an array of intermediate values is filled."""
+        raise NotImplementedError
+
+    def statements(self, statements: Sequence[Statement]) -> None:
         """Print statements in order."""
         for statement in statements:
             match statement:
@@ -69,6 +73,8 @@ class Printer:
                     self.store(place, self.text(node))
                 case Reduce(node, loop, body):
                     self.reduce(node, loop, body)
+                case Fill():
+                    self.fill(statement)
 
     def finished(self, signature: str) -> str:
         """Return the function that the lines make, preceded by its tables if it has any."""
@@ -109,6 +115,15 @@ class Printer:
             else:
                 assert index is not None
                 self.assign(node, f"{space}[{index(place)}]")
+        elif node.op == "element":
+            stage, place = node.data
+            text = str(place) if isinstance(place, int) or index is None else index(place)
+            self.assign(node, f"{array_of(stage)}[{text}]")
+        elif node.op == "entry":
+            constants, place = node.data
+            assert index is not None
+            name = self.table(f"np.array({constants.values.tolist()!r})")
+            self.assign(node, self.entry(name, index(place)))
         elif node.op == "table":
             self.look_up(node)
         elif node.op != "const":
@@ -136,6 +151,10 @@ class Printer:
         for power in range(1, len(table.rows[0])):
             text = f"({text})*{rest} + {rows}[{place}, {power}]"
         self.assign(node, text)
+
+    def entry(self, name: str, place: str) -> str:
+        """Return the text of a number of an array, or of one for each term of a loop."""
+        return f"{name}[{place}]"
 
     def array(self, name: str) -> str:
         """Return the text of a table's array where it is indexed."""

@@ -28,5 +28,6 @@ DOUBLES = Numbers(
     | {"pow": np.power, "where": lambda condition, a, b: np.where(condition > 0.0, a, b)},
     rows=lambda values, n, columns: np.broadcast_to(values, (n, columns)),
     total=lambda terms: np.cumsum(terms, axis=0)[-1],
+    stacked=np.stack,
 )
 """Doubles, summed in the order of the terms."""

@@ -4,7 +4,7 @@ Constants, parameters and states are the doubles that the integrators see; every
 of the numbers.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from problems.calculus.function import Function
 from problems.trace.fold import Fold
-from problems.trace.graph import Loop, Node, reachable
+from problems.trace.graph import Node, reachable
+from problems.trace.loops import Affine, Loop, Stage
 
 Array = NDArray[np.float64]
 
@@ -32,12 +33,15 @@ class Numbers:
         ``rows(values, n, columns)``: the values, broadcast to the shape (n, columns).
     total : callable
         The sum of an array along its first axis.
+    stacked : callable
+        An array of arrays, one row for each.
     """
 
     of: Callable[[Any], Any]
     operations: Mapping[str, Callable[..., Any]]
     rows: Callable[[Any, int, int], Any]
     total: Callable[[Any], Any]
+    stacked: Callable[[list[Any]], Any]
 
     def value(self, node: Node, *args: Any) -> Any:
         """Return the value of an operation at numbers."""
@@ -62,6 +66,7 @@ class Evaluator(Fold[Any]):
     def __init__(self, numbers: Numbers, t: Any, y: Any, par: Any, n: int) -> None:
         super().__init__()
         self._numbers, self._n = numbers, n
+        self._stages: dict[Stage, Any] = {}
         self._inputs = {"t": t, "y": y, "par": par}
 
     def outputs(self, function: Function) -> list[Any]:
@@ -70,16 +75,27 @@ class Evaluator(Fold[Any]):
         with np.errstate(all="ignore"):
             for node in reachable(function.roots):
                 if node.loop is None:
-                    self.known[node.id] = self.visit(node, [self.known.get(arg.id) for arg in node.args])
-            summands: list[list[Any]] = [[] for _ in function.outputs]
-            for loop, entries in function.loops:
-                values = self._inside([entry.node for entry in entries], loop)
-                for entry, terms in zip(entries, values, strict=True):
-                    for row, place in enumerate(entry.index.values(loop)):
-                        summands[place].append(terms[row])
-            for terms, parts in zip(function.outputs, summands, strict=True):
-                parts.extend(self.known[term.node.id] for term in terms)
-            return [self._added(parts) for parts in summands]
+                    self.known[node.id] = self.visit(node, [self.known[arg.id] for arg in node.reads])
+            loops = ((loop, [(entry.index, entry.node) for entry in each]) for loop, each in function.loops)
+            terms = ((place, term.node) for place, each in enumerate(function.outputs) for term in each)
+            return self._filled(len(function.outputs), loops, terms)
+
+    def _filled(
+        self,
+        size: int,
+        loops: Iterable[tuple[Loop, Sequence[tuple[Affine, Node]]]],
+        terms: Iterable[tuple[int, Node]],
+    ) -> list[Any]:
+        """Return so many sums, shape (n,) each: of what loops add to them, then of single terms."""
+        summands: list[list[Any]] = [[] for _ in range(size)]
+        for loop, entries in loops:
+            values = self._inside([node for _, node in entries], loop)
+            for (index, _), rows in zip(entries, values, strict=True):
+                for row, place in enumerate(index.values(loop)):
+                    summands[place].append(rows[row])
+        for place, node in terms:
+            summands[place].append(self.known[node.id])
+        return [self._added(parts) for parts in summands]
 
     def _added(self, parts: list[Any]) -> Any:
         return self._numbers.rows(sum(parts, start=self._numbers.of(0.0)), 1, self._n)[0]
@@ -88,7 +104,7 @@ class Evaluator(Fold[Any]):
         """Return the values of nodes of a loop, shape (terms, n) each; of others the same in each term."""
         body: dict[int, Any] = {}
         for node in reachable(roots, loop):
-            args = [body[arg.id] if arg.id in body else self.known[arg.id] for arg in node.args]
+            args = [body[arg.id] if arg.id in body else self.known[arg.id] for arg in node.reads]
             body[node.id] = self.visit(node, args)
         found = [body[root.id] if root.id in body else self.known[root.id] for root in roots]
         return [self._numbers.rows(values, len(loop), self._n) for values in found]
@@ -103,7 +119,17 @@ class Evaluator(Fold[Any]):
     def visit_index(self, node: Node) -> Any:
         return self._numbers.of(node.data.values(node.loop).astype(np.float64)[:, np.newaxis])
 
-    def visit_sum(self, node: Node, _: Any) -> Any:
+    def visit_entry(self, node: Node) -> Any:
+        constants, place = node.data
+        return self._numbers.of(constants.values[place.values(node.loop)][:, np.newaxis])
+
+    def visit_element(self, node: Node, *_: Any) -> Any:
+        stage, place = node.data
+        if stage not in self._stages:
+            self._stages[stage] = self._numbers.stacked(self._filled(stage.size, stage.loops, stage.terms))
+        return self._stages[stage][place if isinstance(place, int) else place.values(node.loop)]
+
+    def visit_sum(self, node: Node, *_: Any) -> Any:
         return self._numbers.total(self._inside([node.args[0]], node.data)[0])
 
     def visit_operation(self, node: Node, *args: Any) -> Any:

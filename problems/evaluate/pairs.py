@@ -43,6 +43,7 @@ PAIRS = Numbers(
     },
     rows=_rows,
     total=_total,
+    stacked=lambda rows: DD(np.stack([row.hi for row in rows]), np.stack([row.lo for row in rows])),
 )
 """Pairs of doubles."""
 
@@ -66,8 +67,8 @@ def evaluate(function: Function, t: ArrayLike, y: Array | DD, par: Array) -> lis
     list of DD
         One array of shape (n,) per output.
     """
-    lengths = [len(node.data) for node in reachable(function.roots) if node.op == "sum"]
-    largest = max([1, *lengths, *(len(loop) for loop, _ in function.loops)])
+    inside = [len(node.loop) for node in reachable(function.roots) if node.loop is not None]
+    largest = max([1, *inside, *(len(loop) for loop, _ in function.loops)])
     columns = max(1, _BLOCK // largest)
     y = as_dd(y)
     n = y.hi.shape[1]

@@ -54,6 +54,7 @@ WIDE = Numbers(
     operations={name: _guarded(function, n) for name, (function, n) in _OPERATIONS.items()},
     rows=lambda values, n, columns: np.broadcast_to(np.asarray(values, dtype=object), (n, columns)),
     total=lambda terms: np.add.reduce(terms, axis=0),
+    stacked=np.stack,
 )
 """Numbers of mpmath with 36 digits."""
 

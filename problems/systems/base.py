@@ -1,5 +1,6 @@
 """Base class of all systems: a traced graph, parameters, invariants and symmetry guards."""
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -22,7 +23,7 @@ from problems.trace import arguments
 from problems.trace.graph import Graph, Node, T
 from problems.trace.packed import packed, unpacked
 
-Value = float | Sequence[float]
+Value = float | Sequence[Any]
 _NAMED = ("field", "hamiltonian", "force", "velocity_scale")
 
 
@@ -295,12 +296,13 @@ class System:
         for name, given in changes.items():
             if name not in self._layout:
                 raise unknown(f"parameter of {self.name}", name, self._layout)
-            offset, size = self._layout[name]
-            several = _is_list(given)
-            if several != (size is not None) or (several and len(given) != size):
-                wanted = "one number" if size is None else f"a list of {size} numbers"
+            offset, shape = self._layout[name]
+            numbers_given = list(given) if _is_list(given) else [given]
+            if shape[1:] or _is_list(given) != bool(shape) or len(numbers_given) != math.prod(shape):
+                wanted = "one number" if not shape else f"a list of {shape[0]} numbers"
+                wanted = "no value" if shape[1:] else wanted
                 raise InputError(f"{label} must return {wanted} for the parameter {name!r}.")
-            parameters[offset : offset + (size or 1)] = list(given) if several else [given]
+            parameters[offset : offset + len(numbers_given)] = numbers_given
         return list(new), parameters
 
     @property
@@ -516,22 +518,23 @@ class System:
         for key in checked(self.name, "parameters", values, Named[Value]):
             if key not in self._layout:
                 raise unknown(f"parameter of {self.name}", key, self._layout)
-        for key, (offset, size) in self._layout.items():
+        for key, (offset, shape) in self._layout.items():
             value = _parameter(key, values[key]) if key in values else self.parameters[key]
-            if size is None and isinstance(value, tuple):
+            if not shape and isinstance(value, tuple):
                 raise InputError(f"parameter {key!r} of {self.name} is one number, not {len(value)}.")
-            if size is not None and (not isinstance(value, tuple) or len(value) != size):
-                raise InputError(
-                    f"parameter {key!r} of {self.name} needs {size} numbers, not {shown(value)}."
-                )
-            par[offset : offset + (size or 1)] = value
+            if np.shape(value) != shape:
+                needed = f"{shape[0]} numbers" if len(shape) == 1 else f"numbers of shape {shape}"
+                raise InputError(f"parameter {key!r} of {self.name} needs {needed}, not {shown(value)}.")
+            par[offset : offset + math.prod(shape)] = np.ravel(value)
         return par
 
     def unpack(self, par: NDArray[np.float64]) -> dict[str, float | NDArray[np.float64]]:
         """Return the parameters by name from the flat vector that `pack` makes; sequences as arrays."""
         return {
-            key: float(par[offset]) if size is None else par[offset : offset + size].copy()
-            for key, (offset, size) in self._layout.items()
+            key: par[offset : offset + math.prod(shape)].reshape(shape).copy()
+            if shape
+            else float(par[offset])
+            for key, (offset, shape) in self._layout.items()
         }
 
 
@@ -544,14 +547,13 @@ def _is_list(value: Any) -> bool:
     return arguments.is_list(value) or len(getattr(value, "shape", ())) == 1
 
 
-def _layout(parameters: Mapping[str, Value]) -> tuple[dict[str, tuple[int, int | None]], int]:
-    """Return where each parameter lies in the flat vector, and the length of that."""
-    layout: dict[str, tuple[int, int | None]] = {}
+def _layout(parameters: Mapping[str, Value]) -> tuple[dict[str, tuple[int, tuple[int, ...]]], int]:
+    """Return where each parameter lies in the flat vector, its shape, and the length of that."""
+    layout: dict[str, tuple[int, tuple[int, ...]]] = {}
     offset = 0
     for key, value in parameters.items():
-        size = len(value) if isinstance(value, tuple) else None
-        layout[key] = (offset, size)
-        offset += 1 if size is None else size
+        layout[key] = (offset, np.shape(value))
+        offset += np.size(value)
     return layout, offset
 
 
@@ -559,9 +561,19 @@ def _parameter(name: str, value: Any) -> Value:
     if not name.isidentifier() or name.startswith("__"):
         raise InputError(f"the parameter name {name!r} must be an identifier, such as 'mass'.")
     result = number(value)
-    result = numbers(value) if result is None else result
-    if result is None or result == ():
+    result = _nested(value) if result is None else result
+    if result is None or np.size(result) == 0:
         raise InputError(
-            f"parameter {name!r} is {shown(value)}; give one finite number or a flat list of them."
+            f"parameter {name!r} is {shown(value)}; give one finite number, a list or an array of them."
         )
     return result
+
+
+def _nested(value: Any) -> Any:
+    """Return numbers of one or more dimensions as tuples; ``None`` for anything else."""
+    flat = numbers(value)
+    if flat is not None or not isinstance(value, list | tuple | np.ndarray):
+        return flat
+    rows = [_nested(row) for row in value]
+    same = None not in rows and len({np.shape(row) for row in rows}) == 1
+    return tuple(rows) if rows and same else None

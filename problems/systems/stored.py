@@ -48,7 +48,7 @@ def check_system(state: Mapping[str, Any], classes: Iterable[str]) -> dict[str, 
     parameters = state["parameters"]
     if not isinstance(parameters, Mapping) or not all(isinstance(name, str) for name in parameters):
         refuse("its parameters are no dictionary by name")
-    n_par = sum(len(value) if isinstance(value, list | tuple) else 1 for value in parameters.values())
+    n_par = sum(_count(value) for value in parameters.values())
     invariants, guards = _names(state["invariants"]), _names(state["guards"])
     vectors = _names(state["vectors"])
     if not set(vectors) <= set(invariants):
@@ -80,6 +80,10 @@ def check_system(state: Mapping[str, Any], classes: Iterable[str]) -> dict[str, 
         if name in scalars and (len(plain[0][0]) != 1 or plain[1]):
             refuse(f"{name} is not one number")
     return own
+
+
+def _count(value: Any) -> int:
+    return sum(map(_count, value)) if isinstance(value, list | tuple) else 1
 
 
 def _names(value: Any) -> list[str]:

@@ -3,10 +3,12 @@
 from collections.abc import Callable
 from typing import Annotated, Any
 
+from problems.calculus.function import Function, Loops, LoopTerm, Term, joined
 from problems.checks import NOTHING, Named, at_least, checked_arguments
 from problems.errors import InputError
 from problems.systems.base import System, Value
 from problems.trace import arguments
+from problems.trace.each import Each, components, length
 from problems.trace.source_line import line_of_function
 
 
@@ -16,7 +18,8 @@ class VectorField(System):
     Parameters
     ----------
     f : callable
-        The right-hand side; returns the list of derivatives. Its arguments are among ``t, y, par, m``.
+        The right-hand side; returns the list of derivatives, in which ``m.each``, ``m.scatter`` and ``m.dot``
+        are as many components as they have. Its arguments are among ``t, y, par, m``.
     dim : int
         Length of the state.
     parameters, invariants, guards, name
@@ -47,15 +50,30 @@ class VectorField(System):
     ) -> None:
         super().__init__(f, dim, None, parameters, invariants, guards, name)
         value = self._call(f, "f")
-        if not arguments.is_list(value) or len(value) != dim:
-            got = f"{len(value)} values" if hasattr(value, "__len__") else "one value"
+        size = length(value) if arguments.is_list(value) else None
+        if size != dim:
+            got = "one value" if size is None else f"{size} values"
             raise InputError(
                 f"{line_of_function(f)}: f returns {got}, not a list of dim={dim}; "
                 "return one derivative for each component of y."
             )
-        nodes = [self._node(v, f, f"f's component {i}") for i, v in enumerate(value)]
-        self._write("field", nodes)
+        self._written["field"] = self._joined(f, value)
         self._trace_declared(invariants, guards)
+
+    def _joined(self, f: Callable[..., Any], value: Any) -> Function:
+        """Return the function of a list of numbers, and of arrays that loops fill."""
+        outputs: list[tuple[Term, ...]] = [()] * self.dim
+        loops: list[tuple[int, Loops]] = []
+        for at, part in components(value):
+            if not isinstance(part, Each):
+                node = self._node(part, f, f"f's component {at}")
+                outputs[at] = (Term(node, node.id),)
+                continue
+            for place, node in part.terms:
+                outputs[at + place] = (*outputs[at + place], Term(node, node.id))
+            terms = (tuple(LoopTerm(place, node) for place, node in entries) for _, entries in part.loops)
+            loops.append((at, tuple(zip((loop for loop, _ in part.loops), terms, strict=True))))
+        return Function(self._graph, tuple(outputs), joined(loops), "field")
 
     def __repr__(self) -> str:
         return f"VectorField({self.name}, dim={self.dim})"

@@ -10,12 +10,13 @@ import numpy as np
 from problems import limits
 from problems.errors import InputError, shown, unknown
 from problems.trace import sums
+from problems.trace.each import Constants, Each, constants, dot, each, flat_index, place_of, scatter
 from problems.trace.functions import OF_ONE_ARGUMENT
 from problems.trace.graph import PAR, Condition, Graph, Node, P, Q, T, Table
 from problems.trace.source_line import line_of_function, line_of_traceback, refuse
 
-# Where each parameter lies in the flat vector `par`: offset, and length (None: a scalar).
-Layout = Mapping[str, tuple[int, int | None]]
+# Where each parameter lies in the flat vector `par`: offset, and shape.
+Layout = Mapping[str, tuple[int, tuple[int, ...]]]
 
 
 class Vector:
@@ -59,7 +60,7 @@ class Vector:
 
     def __getitem__(self, i: Any) -> Any:
         if isinstance(i, slice):
-            return [self._at(k) for k in range(self._size)[i]]
+            return Slice(self, range(self._size)[i])
         if isinstance(i, sums.Index):
             affine = i.affine.shifted(self._offset)
             places = affine.values(i.loop)
@@ -100,6 +101,45 @@ class Vector:
     __iadd__ = __isub__ = __imul__ = __itruediv__ = _whole
 
 
+class Slice(list[Node]):
+    """A part of a vector: a list that loops may read as well."""
+
+    def __init__(self, whole: Vector, places: range):
+        super().__init__(whole[k] for k in places)
+        self._whole, self._places = whole, places
+
+    def __getitem__(self, i: Any) -> Any:
+        if not isinstance(i, sums.Index):
+            return super().__getitem__(i)
+        if place_of(i, len(self), "this slice")[1] is None:
+            return super().__getitem__(i.affine.offset)
+        return self._whole[i * self._places.step + self._places.start]
+
+    @property
+    def vector(self) -> "Slice":
+        """What loops read."""
+        return self
+
+
+class Matrix:
+    """A parameter of several dimensions, read by as many indices: ``par.K[i, j]``."""
+
+    def __init__(self, flat: Vector, shape: tuple[int, ...]):
+        self._flat, self.shape = flat, shape
+
+    def __repr__(self) -> str:
+        return f"{self._flat!r:.40} of shape {self.shape}"
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __getitem__(self, indices: Any) -> Node:
+        return self._flat[flat_index(indices, self.shape, "this parameter")]
+
+    def __array_ufunc__(self, *_: Any, **__: Any) -> NoReturn:
+        refuse("this calculates with a whole parameter", "write it in components, or with m.dot")
+
+
 def further(graph: Graph, name: str, offset: int, shape: tuple[int, ...]) -> Any:
     """Return numbers that lie behind the parameters, as one symbol, shape (), or as a vector, (n,)."""
     if not shape:
@@ -109,7 +149,7 @@ def further(graph: Graph, name: str, offset: int, shape: tuple[int, ...]) -> Any
 
 def is_list(value: Any) -> bool:
     """Whether a function returned several numbers."""
-    return isinstance(value, list | tuple | Vector)
+    return isinstance(value, list | tuple | Vector | Each)
 
 
 class Parameters:
@@ -129,10 +169,11 @@ class Parameters:
                 str(unknown("parameter", name, self._layout)).rstrip("."),
                 f"declare it: parameters={{{name!r}: value}}",
             )
-        offset, size = self._layout[name]
-        if size is None:
+        offset, shape = self._layout[name]
+        if not shape:
             return self._graph.symbol("par", offset, flags=PAR)
-        return Vector(self._graph, f"par.{name}", "par", offset, size)
+        vector = Vector(self._graph, f"par.{name}", "par", offset, math.prod(shape))
+        return vector if len(shape) == 1 else Matrix(vector, shape)
 
     def __getitem__(self, name: Any) -> Any:
         if not isinstance(name, str):
@@ -156,6 +197,24 @@ class Mathematics:
         if index is None:
             refuse("m.sum needs a term and an index list", "write m.sum(lambda i: q[i]**2, range(n))")
         return sums.declare(self._graph, term, index)
+
+    def each(self, term: Any, index: Iterable[Any] | None = None) -> Each:
+        """Return the array of ``term(i)`` for the i of ``index``, as one loop."""
+        if index is None:
+            refuse("m.each needs a term and an index list", "write m.each(lambda i: -y[i], range(n))")
+        return each(self._graph, term, index)
+
+    def scatter(self, term: Any, index: Iterable[Any], n: int) -> Each:
+        """Return n sums, to which ``term(i, j)`` adds at the places it names: ``{i: force, j: -force}``."""
+        return scatter(self._graph, term, index, n)
+
+    def dot(self, matrix: Any, vector: Any) -> Any:
+        """Return a matrix times a vector; of two vectors, their scalar product."""
+        return dot(self._graph, matrix, vector)
+
+    def array(self, values: Any) -> Constants:
+        """Return an array of numbers that loops may read: ``K = m.array(K); K[i, j]``."""
+        return constants(self._graph, values)
 
     def atan2(self, y: Any, x: Any) -> Node:
         """Return the angle of the point (x, y), from -pi to pi."""
@@ -229,7 +288,7 @@ class Mathematics:
         return function
 
 
-OTHERS = ("atan2", "hypot", "min", "max", "where", "table", "sum", "pi")
+OTHERS = ("atan2", "hypot", "min", "max", "where", "table", "sum", "each", "scatter", "dot", "array", "pi")
 """What else a formula finds in m."""
 
 

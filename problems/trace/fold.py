@@ -3,7 +3,8 @@
 from collections.abc import Sequence
 from typing import Generic, TypeVar
 
-from problems.trace.graph import Affine, Graph, Loop, Node, reachable
+from problems.trace.graph import Graph, Node, reachable
+from problems.trace.loops import Affine, Loop, Stage
 
 R = TypeVar("R")
 
@@ -48,6 +49,7 @@ class Copy(Fold[Node]):
     def __init__(self, graph: Graph) -> None:
         super().__init__()
         self.graph = graph
+        self._stages: dict[Stage, Stage] = {}
 
     def visit_const(self, node: Node) -> Node:
         return self.graph.const(node.data)
@@ -60,6 +62,21 @@ class Copy(Fold[Node]):
         loop = self.loop(node.loop)
         assert loop is not None
         return self.graph.index(node.data, loop)
+
+    def visit_entry(self, node: Node) -> Node:
+        constants, place = node.data
+        return self.graph.entry(self.graph.constants(constants.values), place, self.loop(node.loop))
+
+    def visit_element(self, node: Node, *_: Node) -> Node:
+        stage, place = node.data
+        return self.graph.element(self.stage(stage), place, self.loop(node.loop))
+
+    def stage(self, stage: Stage) -> Stage:
+        """Return the stage that takes the place of one."""
+        if stage not in self._stages:
+            parts = stage.parts(lambda root: self.known[root.id], lambda loop: self.graph.loop(loop.rows))
+            self._stages[stage] = self.graph.stage(stage.size, *parts)
+        return self._stages[stage]
 
     def visit_sum(self, node: Node, body: Node) -> Node:
         loop = self.loop(node.data)

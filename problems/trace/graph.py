@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from problems import limits
 from problems.trace.arithmetic import ARITHMETIC
 from problems.trace.functions import FUNCTIONS
+from problems.trace.loops import Affine, Constants, Loop, Place, Stage, Summands
 from problems.trace.source_line import refuse, users_line
 
 T, Q, P, PAR = 1, 2, 4, 8  # what a node depends on: time, positions, momenta, parameters
@@ -47,57 +48,6 @@ def _ufunc(spelled: str) -> str:
 def _described(value: Any) -> str:
     shape = getattr(value, "shape", None)
     return f"an array of shape {shape}" if shape else f"{value!r:.40}"
-
-
-class Loop:
-    """The index list of a declared sum; one object per graph and list.
-
-    Attributes
-    ----------
-    rows : ndarray of int64, shape (n, width)
-        The indices, one row per term.
-    id : int
-        Ordinal number in its graph.
-    """
-
-    def __init__(self, rows: NDArray[np.int64], number: int) -> None:
-        self.rows = rows
-        self.id = number
-
-    def __len__(self) -> int:
-        return len(self.rows)
-
-    def __repr__(self) -> str:
-        return f"Loop({len(self.rows)}x{self.rows.shape[1]})"
-
-    @property
-    def width(self) -> int:
-        """Number of integers that a term is called with."""
-        return self.rows.shape[1]
-
-
-@dataclass(frozen=True)
-class Affine:
-    """An index that is an affine function of a loop's integers.
-
-    Attributes
-    ----------
-    coefficients : tuple of int
-        One per integer of the loop.
-    offset : int
-        The constant part.
-    """
-
-    coefficients: tuple[int, ...]
-    offset: int
-
-    def values(self, loop: Loop) -> NDArray[np.int64]:
-        """Return the index of every term, shape (n,)."""
-        return loop.rows @ np.array(self.coefficients, dtype=np.int64) + self.offset
-
-    def shifted(self, shift: int) -> "Affine":
-        """Return the index plus a constant."""
-        return Affine(self.coefficients, self.offset + shift)
 
 
 @dataclass(frozen=True)
@@ -181,12 +131,14 @@ class Node:
     op : str
         ``"const"``, ``"symbol"``, ``"index"``, ``"add"``, ``"sub"``, ``"mul"``, ``"div"``,
         ``"neg"``, ``"pow"``, ``"sum"``, ``"where"`` (the second argument where the first is
-        above 0, else the third), ``"table"`` or one of `problems.trace.functions.FUNCTIONS`.
+        above 0, else the third), ``"table"``, ``"entry"`` (one of some constants), ``"element"`` (of a
+        stage) or one of `problems.trace.functions.FUNCTIONS`.
     args : tuple of Node
-        The arguments, in the user's order.
+        The arguments, in the user's order; of an element, all that its stage is made of.
     data : Any
         The value of a constant; (space, index) of a symbol; the affine index of
-        ``"index"``; the exponent of ``"pow"``; the loop of ``"sum"``; the `Table` of ``"table"``.
+        ``"index"``; the exponent of ``"pow"``; the loop of ``"sum"``; the `Table` of ``"table"``;
+        (`Constants`, index) of ``"entry"``; (`Stage`, index) of ``"element"``.
     flags : int
         What the node depends on, of `T`, `Q`, `P`, `PAR`.
     loop : Loop or None
@@ -205,6 +157,11 @@ class Node:
         self.data = data
         self.flags = flags
         self.loop = loop
+
+    @property
+    def reads(self) -> "tuple[Node, ...]":
+        """The nodes whose values it is calculated from where it stands: a loop's are in the loop."""
+        return () if self.op in ("element", "sum") else self.args
 
     def __repr__(self) -> str:
         inside = ", ".join([f"#{arg.id}" for arg in self.args] + ([repr(self.data)] if self.data else []))
@@ -335,7 +292,10 @@ class Graph:
         self.dof = dof
         self.nodes: list[Node] = []
         self._loops: dict[Hashable, Loop] = {}
-        self.in_term = False  # whether the term of a declared sum is being traced
+        self._constants: dict[bytes, Constants] = {}
+        self._stages: dict[Hashable, Stage] = {}
+        self.scopes: list[Loop] = []  # those whose terms are being traced, each with the columns of the last
+        self._lifted: dict[tuple[int, int], Node] = {}
         self.limit: int | None = None  # number of nodes, while a user's function makes them
         self._table: dict[Hashable, Node] = {}
 
@@ -348,6 +308,8 @@ class Graph:
         flags: int = 0,
         loop: Loop | None = None,
     ) -> Node:
+        if len(args) > 1:
+            args = self._in_one_loop(args)
         known = self._table.get(key := _key(op, args, data, loop))
         if known is not None:
             return known
@@ -366,6 +328,48 @@ class Graph:
         self.nodes.append(node)
         self._table[key] = node
         return node
+
+    def _in_one_loop(self, args: tuple[Node, ...]) -> tuple[Node, ...]:
+        """Return arguments of loops one inside the other as those of the innermost."""
+        loops = {arg.loop for arg in args if arg.loop is not None}
+        if len(loops) < 2 or not all(loop in self.scopes for loop in loops):
+            return args
+        innermost = max(loops, key=self.scopes.index)
+        return tuple(arg if arg.loop is None else self.lifted(arg, innermost) for arg in args)
+
+    def lifted(self, node: Node, loop: Loop) -> Node:
+        """Return a node of a loop in one whose list begins with the columns of that."""
+        if node.loop is None or node.loop is loop:
+            return node
+        for inner in reachable([node], node.loop):
+            if (inner.id, loop.id) not in self._lifted:
+                self._lifted[inner.id, loop.id] = self._of_loop(inner, loop)
+        return self._lifted[node.id, loop.id]
+
+    def lifted_to(self, node: Node, loop: Loop) -> Node:
+        """Return a node as one of a loop that is being traced; others belong to a loop that has ended."""
+        if node.loop is not None and node.loop not in self.scopes and node.loop is not loop:
+            refuse(
+                "this mixes the terms of two sums",
+                "use the symbols of one m.sum inside its own term only",
+            )
+        return self.lifted(node, loop)
+
+    def _of_loop(self, node: Node, loop: Loop) -> Node:
+        match node.op:
+            case "index":
+                return self.index(node.data.widened(loop.width), loop)
+            case "symbol" | "entry" | "element":
+                source, place = node.data
+                place = place.widened(loop.width)
+                if node.op == "symbol":
+                    return self.symbol(source, place, flags=node.flags, loop=loop)
+                return (
+                    self.entry(source, place, loop)
+                    if node.op == "entry"
+                    else self.element(source, place, loop)
+                )
+        return self.apply(node, tuple(self._lifted.get((arg.id, loop.id), arg) for arg in node.args))
 
     def keep(self, op: str, args: tuple[Node, ...], data: Any, flags: int, loop: Loop | None) -> Node:
         """Append an operation as it is, without any rewriting: one of a graph that was packed, or a sum."""
@@ -398,6 +402,35 @@ class Graph:
     def index(self, affine: Affine, loop: Loop) -> Node:
         """Return the node of a loop index used as a number."""
         return self._intern("index", (), affine, loop=loop)
+
+    def constants(self, values: NDArray[np.float64]) -> Constants:
+        """Return numbers that loops read, shape (n,); one object per list."""
+        return self._constants.setdefault(values.tobytes(), Constants(values, len(self._constants)))
+
+    def entry(self, constants: Constants, place: Place, loop: Loop | None) -> Node:
+        """Return one of some constants."""
+        if isinstance(place, int):
+            return self.node(constants.values[place])
+        return self._intern("entry", (), (constants, place), loop=loop)
+
+    def stage(self, size: int, loops: Summands, terms: tuple[tuple[int, Node], ...] = ()) -> Stage:
+        """Return an array that is filled by loops and single terms; one object for the same summands."""
+        key = (
+            size,
+            tuple((loop.id, tuple((place, node.id) for place, node in entries)) for loop, entries in loops),
+            tuple((place, node.id) for place, node in terms),
+        )
+        return self._stages.setdefault(key, Stage(len(self._stages), size, loops, terms))
+
+    def element(self, stage: Stage, place: Place, loop: Loop | None) -> Node:
+        """Return one value of a stage."""
+        node = self._table.get(_key("element", (), (stage, place), loop))
+        if node is not None:
+            return node
+        flags = 0
+        for root in stage.roots:
+            flags |= root.flags
+        return self.keep("element", stage.roots, (stage, place), flags, loop)
 
     def sum(self, body: Node, loop: Loop) -> Node:
         """Return the node of a declared sum of ``body`` over ``loop``, in the loop's order."""
@@ -565,7 +598,7 @@ class Graph:
                 return self.sum(args[0], node.data)
             case "table":
                 return self.table(args[0], node.data)
-            case "const" | "symbol" | "index":
+            case "const" | "symbol" | "index" | "entry" | "element":
                 return node
             case _:
                 return self.call(node.op, *args)
@@ -578,6 +611,8 @@ def _key(op: str, args: tuple[Node, ...], data: Any, loop: Loop | None) -> Hasha
             return op, repr(data)  # which tells 0.0 from -0.0; they compare equal
         case "symbol" | "index":
             return op, data, None if loop is None else loop.id
+        case "entry" | "element":
+            return op, data[0].id, data[1], None if loop is None else loop.id
         case "add" | "mul":
             a, b = args
             return (op, a.id, b.id) if a.id <= b.id else (op, b.id, a.id)

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from problems.trace.graph import Affine, Graph, Loop, Table
+from problems.trace.graph import Graph, Table
+from problems.trace.loops import Affine, Constants, Loop, Place, Stage
 
 _SPACES = ("t", "y", "par")
 
@@ -44,22 +45,37 @@ def unpacked(state: Mapping[str, Any]) -> Graph:
             graph.skip()
             continue
         op, args, data, flags, *inside = plain
-        data = _OF_PLAIN[op](data, loops) if op in _OF_PLAIN else None
+        data = _OF_PLAIN[op](data, graph) if op in _OF_PLAIN else None
         loop = loops[inside[0]] if inside else None
         graph.keep(op, tuple(graph.nodes[i] for i in args), data, int(flags), loop)
     return graph
+
+
+def _place(plain: Any) -> Place:
+    return plain if isinstance(plain, int) else _affine(plain)
+
+
+def _stage(plain: Sequence[Any], graph: Graph) -> Stage:
+    size, loops, terms = plain
+    summands = tuple(
+        (graph.loops[loop], tuple((_affine(place), graph.nodes[i]) for place, i in entries))
+        for loop, entries in loops
+    )
+    return graph.stage(size, summands, tuple((place, graph.nodes[i]) for place, i in terms))
 
 
 def _affine(plain: Sequence[Any]) -> Affine:
     return Affine(tuple(int(c) for c in plain[0]), int(plain[1]))
 
 
-_OF_PLAIN: dict[str, Callable[[Any, list[Loop]], Any]] = {
+_OF_PLAIN: dict[str, Callable[[Any, Graph], Any]] = {
     "const": lambda data, _: float(data),
-    "symbol": lambda data, _: (data[0], data[1] if isinstance(data[1], int) else _affine(data[1])),
+    "symbol": lambda data, _: (data[0], _place(data[1])),
     "index": lambda data, _: _affine(data),
     "pow": lambda data, _: int(data),
-    "sum": lambda data, loops: loops[data],
+    "sum": lambda data, graph: graph.loops[data],
+    "entry": lambda data, graph: (graph.constants(np.array(data[0], dtype=np.float64)), _affine(data[1])),
+    "element": lambda data, graph: (_stage(data[0], graph), _place(data[1])),
     "table": lambda data, _: Table(tuple(map(float, data[0])), tuple(tuple(map(float, r)) for r in data[1])),
 }
 """What `Node.data` is, from what `_plain` returns."""
@@ -73,6 +89,13 @@ def _plain(data: Any) -> Any:
             return [list(data.knots), [list(row) for row in data.rows]]
         case Affine():
             return [list(data.coefficients), data.offset]
+        case Constants():
+            return data.values.tolist()
+        case Stage():
+            loops = [[loop.id, [[_plain(at), n.id] for at, n in entries]] for loop, entries in data.loops]
+            return [data.size, loops, [[place, node.id] for place, node in data.terms]]
+        case (Constants() | Stage() as source, place):
+            return [_plain(source), _plain(place)]
         case (space, place):
             return [space, _plain(place)]
     return data

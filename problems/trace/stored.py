@@ -20,8 +20,10 @@ from problems.trace.arithmetic import ARITHMETIC
 from problems.trace.functions import FUNCTIONS
 from problems.trace.graph import PAR, P, Q, T
 
-_ARGUMENTS = {
+_ARGUMENTS: dict[str, int | None] = {
     "const": 0,
+    "entry": 0,
+    "element": None,
     "symbol": 0,
     "index": 0,
     "pow": 1,
@@ -115,7 +117,8 @@ class StoredGraph:
         op, args, data, flags, *inside = items(plain, "an operation")
         if not isinstance(op, str) or op not in _ARGUMENTS or len(inside) > 1:
             refuse(f"it has no operation {shown(op)}")
-        used = [self.node(i) for i in items(args, f"the list of arguments of {op}", _ARGUMENTS[op])]
+        numbered = items(args, f"the list of arguments of {op}", _ARGUMENTS[op])
+        used = [self.node(i) for i in numbered]
         mine = integer(inside[0], 0, len(self.loops), "a loop") if inside else None
         depends = 0
         for arg in used:
@@ -129,6 +132,19 @@ class StoredGraph:
             case "index":
                 loop = {mine}
                 self.places(data, mine, "an index")
+            case "entry":
+                values, place = items(data, "a constant of a loop", 2)
+                listed = [_number(value, "a constant") for value in items(values, "constants")]
+                loop = {mine}
+                _within(self.places(place, mine, "the place of a constant"), len(listed), "a constant")
+            case "element":
+                stage, place = items(data, "a value", 2)
+                size = self._stage(stage, numbered)
+                loop = set() if mine is None else {mine}
+                if mine is None:
+                    integer(place, 0, size, "the place of a value")
+                else:
+                    _within(self.places(place, mine, "the place of a value"), size, "a value")
             case "pow":
                 integer(data, 3, 1001, "an exponent")
             case "table":
@@ -142,6 +158,31 @@ class StoredGraph:
         if type(flags) is not int or flags != depends:
             refuse(f"{op} depends on other things than it says")
         return _Known(True, depends, mine)
+
+    def _stage(self, plain: Any, roots: list[Any]) -> int:
+        """Check an array of values that loops fill; return its size."""
+        size, loops, terms = items(plain, "an array of values", 3)
+        integer(size, 1, _LARGEST, "the size of an array")
+        limits.check("a stored array", "TERMS", size)
+        nodes: list[Any] = []
+        for part in items(loops, "the loops of an array"):
+            number, entries = items(part, "a loop of an array", 2)
+            loop = integer(number, 0, len(self.loops), "a loop")
+            for entry in items(entries, "the entries of an array"):
+                place, i = items(entry, "an entry of an array", 2)
+                _within(self.places(place, loop, "a place of an array"), size, "an array")
+                if self.node(i).loop not in (None, loop):
+                    refuse("a term of an array is in another loop")
+                nodes.append(i)
+        for term in items(terms, "the terms of an array"):
+            place, i = items(term, "a term of an array", 2)
+            integer(place, 0, size, "a place of an array")
+            if self.node(i).loop is not None:
+                refuse("a term of an array is in a loop")
+            nodes.append(i)
+        if nodes != roots:
+            refuse("an array is made of other operations than it says")
+        return size
 
     def _symbol(self, data: Any, loop: int | None) -> tuple[int, set[int | None]]:
         space, place = items(data, "a symbol", 2)
@@ -210,6 +251,11 @@ class StoredGraph:
                     refuse(f"{name} writes to place {int(places.max())} of {n}")
                 if self.node(i).loop not in (None, loop):
                     refuse(f"a term of {name} is in another loop")
+
+
+def _within(places: NDArray[np.int64], size: int, label: str) -> None:
+    if places.min() < 0 or places.max() >= size:
+        refuse(f"{label} has the place {int(places.max())} of {size}")
 
 
 def _rows(plain: Any) -> NDArray[np.int64]:

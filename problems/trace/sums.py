@@ -4,11 +4,15 @@
 inside it is a symbol at an affine index. The graph keeps one node for the sum,
 so that a thousand neighbours are a loop and not a hundred thousand lines. The
 terms are added one after the other, in the order of ``index``.
+
+A sum inside the term of another loop is a loop over all pairs of terms, which fills an array with one
+number for each term of the outer loop (`problems.trace.loops.Stage`).
 """
 
 import numbers
 import sys
-from collections.abc import Callable, Iterable, Sized
+from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
+from contextlib import contextmanager
 from itertools import islice
 from typing import Any, NoReturn
 
@@ -17,7 +21,8 @@ from numpy.typing import NDArray
 
 from problems import limits
 from problems.errors import shown
-from problems.trace.graph import Affine, Graph, Loop, Node
+from problems.trace.graph import Graph, Node
+from problems.trace.loops import Affine, Loop
 from problems.trace.source_line import refuse, users_line
 
 
@@ -38,16 +43,26 @@ class Index:
         """Return the index as a number of the graph."""
         return self.graph.index(self.affine, self.loop)
 
+    def within(self, loop: Loop) -> "Index":
+        """Return the same index as one of a loop inside its own."""
+        return Index(self.graph, loop, self.affine.widened(loop.width)) if loop is not self.loop else self
+
     def _combined(self, other: Any, mine: int, its: int) -> "Index | None":
-        if isinstance(other, Index) and other.loop is self.loop:
-            a, b = self.affine, other.affine
+        index = self
+        if isinstance(other, Index):
+            scopes = self.graph.scopes
+            if other.loop is not self.loop and not (self.loop in scopes and other.loop in scopes):
+                return None
+            loop = self.loop if other.loop is self.loop else max(self.loop, other.loop, key=scopes.index)
+            index, b = self.within(loop), other.within(loop).affine
         elif isinstance(other, numbers.Integral) and not isinstance(other, bool):
-            a, b = self.affine, Affine((0,) * self.loop.width, int(other))
+            b = Affine((0,) * self.loop.width, int(other))
         else:
             return None
+        a = index.affine
         pairs = zip(a.coefficients, b.coefficients, strict=True)
         total = Affine(tuple(mine * x + its * y for x, y in pairs), mine * a.offset + its * b.offset)
-        return Index(self.graph, self.loop, total)
+        return Index(self.graph, index.loop, total)
 
     def __add__(self, other: Any) -> Any:
         combined = self._combined(other, 1, 1)
@@ -101,9 +116,15 @@ class Index:
     __mod__ = __rmod__ = __floordiv__ = __rfloordiv__ = __divmod__ = _refuse
 
 
-def _rows(index: Iterable[Any]) -> NDArray[np.int64]:
+def rows_of(index: Iterable[Any], name: str) -> NDArray[np.int64]:
+    """Return an index list as rows, shape (n, width)."""
+    if isinstance(index, Ragged):
+        refuse(f"{name} runs over a list that differs from term to term", "use it inside its own term only")
+    if isinstance(index, np.ndarray) and index.ndim in (1, 2) and np.issubdtype(index.dtype, np.integer):
+        limits.check(f"{users_line()}: this", "TERMS", len(index))
+        return np.ascontiguousarray(index.reshape(len(index), -1), dtype=np.int64)
     if isinstance(index, Node | Index):
-        refuse("the index list of m.sum depends on a symbol", "give a range or a list of integers")
+        refuse(f"the index list of {name} depends on a symbol", "give a range or a list of integers")
     try:
         size = len(index) if isinstance(index, Sized) else 0
     except OverflowError:  # of a range that is longer than any list
@@ -112,7 +133,7 @@ def _rows(index: Iterable[Any]) -> NDArray[np.int64]:
     try:
         listed = list(islice(index, int(min(limits.limit("TERMS"), sys.maxsize - 1)) + 1))
     except TypeError:
-        refuse(f"the index of m.sum is {shown(index)}", "give a range or a list of integers")
+        refuse(f"the index of {name} is {shown(index)}", "give a range or a list of integers")
     limits.check(f"{users_line()}: this", "TERMS", len(listed))
     if not listed:
         return np.zeros((0, 1), dtype=np.int64)
@@ -122,10 +143,20 @@ def _rows(index: Iterable[Any]) -> NDArray[np.int64]:
         rows = np.array(None)
     if rows.ndim != 2 or not np.issubdtype(rows.dtype, np.integer):
         refuse(
-            "the index of m.sum is not a list of integers or of equally long tuples of integers",
-            "write m.sum(term, range(n)) or m.sum(term, [(i, j) for i in range(n) for j in range(i)])",
+            f"the index of {name} is not a list of integers or of equally long tuples of integers",
+            f"write {name}(term, range(n)) or {name}(term, [(i, j) for i in range(n) for j in range(i)])",
         )
     return rows.astype(np.int64)
+
+
+def listed(graph: Graph, rows: NDArray[np.int64], columns: range | None = None) -> list[Index]:
+    """Return the indices of a loop over rows, those of some columns only."""
+    loop = graph.loop(rows)
+    unit = np.eye(loop.width, dtype=int)
+    return [
+        Index(graph, loop, Affine(tuple(int(c) for c in unit[column]), 0))
+        for column in columns or range(loop.width)
+    ]
 
 
 def declare(graph: Graph, term: Callable[..., Any], index: Iterable[Any]) -> Node:
@@ -138,31 +169,107 @@ def declare(graph: Graph, term: Callable[..., Any], index: Iterable[Any]) -> Nod
     term : callable
         Called once, with one symbolic integer for each column of ``index``.
     index : iterable of int, or of tuples of int
-        The indices, in the order in which the terms are added.
+        The indices, in the order in which the terms are added; inside the term of another loop also a list
+        that this one gives.
 
     Raises
     ------
     problems.errors.InputError
-        If the index is not a list of integers, or a sum stands inside a sum.
+        If the index is not a list of integers.
     """
     if not callable(term):
         refuse(
             "the first argument of m.sum is not a function",
             "write m.sum(lambda i: q[i]**2, range(n)), or Python's sum() for a short list",
         )
-    if graph.in_term:
-        refuse("a sum stands inside the term of a sum", "use one m.sum over a list of tuples")
-    rows = _rows(index)
+    if graph.scopes:
+        return _inside(graph, term, index)
+    rows = rows_of(index, "m.sum")
     if len(rows) == 0:
         return graph.const(0.0)
-    loop = graph.loop(rows)
-    unit = np.eye(loop.width, dtype=int)
-    indices = [Index(graph, loop, Affine(tuple(int(c) for c in row), 0)) for row in unit]
-    graph.in_term = True
-    try:
-        body = graph.node(term(*indices))
-    finally:
-        graph.in_term = False
+    loop, value = traced(graph, rows, range(rows.shape[1]), term)
+    body = graph.node(value)
     if body.loop is None:  # the term does not depend on the index
         return graph.const(float(len(rows))) * body
     return graph.sum(body, loop)
+
+
+class _UnnumberedError(Exception):
+    """The terms of a loop have to be numbered."""
+
+
+def traced(
+    graph: Graph, rows: NDArray[np.int64], columns: range, term: Callable[..., Any]
+) -> tuple[Loop, Any]:
+    """Return the loop over rows, and what a term returns for symbolic integers, those of some columns.
+
+    Where a sum inside of the term needs the number of the term, it is one more column.
+    """
+    indices = listed(graph, rows, columns)
+    try:
+        with scope(graph, indices[0].loop):
+            return indices[0].loop, term(*indices)
+    except _UnnumberedError:
+        indices = listed(graph, np.hstack([rows, np.arange(len(rows))[:, np.newaxis]]), columns)
+    with scope(graph, indices[0].loop):
+        return indices[0].loop, term(*indices)
+
+
+@contextmanager
+def scope(graph: Graph, loop: Loop) -> Iterator[None]:
+    """Let the indices of a loop be used."""
+    graph.scopes.append(loop)
+    try:
+        yield
+    finally:
+        graph.scopes.pop()
+
+
+class Ragged:
+    """A list of indices for each term of a loop: what `m.sum` runs over inside of it."""
+
+    def __init__(self, loop: Loop, lists: Sequence[NDArray[np.int64]]):
+        self.loop, self.lists = loop, lists
+
+    def __len__(self) -> NoReturn:
+        refuse("the length of a list that differs from term to term is asked for", "count with m.sum")
+
+    def __iter__(self) -> NoReturn:
+        refuse(
+            "this runs over a list that differs from term to term",
+            "use m.sum, as in m.sum(lambda j: y[j], neighbours)",
+        )
+
+
+def _inside(graph: Graph, term: Callable[..., Any], index: Any) -> Node:
+    """Return the sum over a list, for each term of the loop that is being traced."""
+    outer = graph.scopes[-1]
+    if isinstance(index, Ragged):
+        if index.loop not in graph.scopes:
+            refuse("this list belongs to another loop", "use it inside its own term only")
+        of_term = _rows_of_terms(index.loop, outer, graph)
+        lists = [index.lists[k] for k in of_term]
+        lengths = np.array([len(each) for each in lists])
+        inner = np.concatenate(lists) if lists else np.zeros((0, 1), dtype=np.int64)
+    else:
+        each = rows_of(index, "m.sum")
+        lengths = np.full(len(outer), len(each))
+        limits.check(f"{users_line()}: this", "TERMS", len(outer) * len(each))
+        inner = np.tile(each, (len(outer), 1))
+    limits.check(f"{users_line()}: this", "TERMS", len(inner))
+    if len(inner) == 0:
+        return graph.const(0.0)
+    if outer.count is None:
+        raise _UnnumberedError
+    rows = np.hstack([np.repeat(outer.rows, lengths, axis=0), inner])
+    loop, value = traced(graph, rows, range(outer.width, rows.shape[1]), term)
+    body = graph.lifted_to(graph.node(value), loop)
+    stage = graph.stage(len(outer), ((loop, ((outer.count.widened(loop.width), body),)),))
+    return graph.element(stage, outer.count, outer)
+
+
+def _rows_of_terms(loop: Loop, inner: Loop, graph: Graph) -> NDArray[np.int64]:
+    """Return for each term of a loop that of the one around it in which it is."""
+    if loop.count is None:
+        refuse("this list's loop is not numbered", "begin its tuples with the running number")
+    return loop.count.widened(inner.width).values(inner)

@@ -13,6 +13,7 @@ from typing import Any
 
 from llvmlite import ir
 from numba import types
+from numba.core import cgutils
 from numba.extending import models, register_model
 
 from integrators.kernel.simd.emit import ALIGNMENT, DOUBLE, INTEGER, vector
@@ -24,6 +25,7 @@ from integrators.kernel.simd.lanes import (
     spread_to,
     type_callable,
 )
+from problems.emit.room import room
 
 
 class Rows(types.Type):
@@ -139,6 +141,29 @@ def _set_number(context, builder, sig, args):
 def _shifted(context, builder, sig, args):
     view = sig.args[0]
     return element(builder, args[0], args[1], view.stride, _item(view))
+
+
+@type_callable(room)
+def _type_room(context):
+    def typed(like, n):
+        if not isinstance(n, types.IntegerLiteral):
+            return None
+        if isinstance(like, Rows):
+            return like(like, n)
+        return DOUBLES(like, n) if isinstance(like, Numbers) else None
+
+    return typed
+
+
+@lower_builtin(room, Rows, types.IntegerLiteral)
+@lower_builtin(room, Numbers, types.IntegerLiteral)
+def _room(context, builder, sig, args):
+    like, n = sig.args
+    count = like.count if isinstance(like, Rows) else 1
+    kind = vector(count) if count > 1 else DOUBLE
+    memory = cgutils.alloca_once(builder, kind, size=ir.Constant(INTEGER, n.literal_value))
+    memory.align = _aligned(count)
+    return builder.bitcast(memory, DOUBLE.as_pointer())
 
 
 @intrinsic(prefer_literal=True)
