@@ -3,13 +3,13 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from problems.trace.graph import Node
+Node = Any
+"""A `problems.trace.graph.Node`: graphs are made of these loops, and not the other way round."""
 
 Integers = NDArray[np.int64]
 
@@ -115,7 +115,7 @@ class Constants:
     id: int
 
 
-Summands = tuple[tuple[Loop, tuple[tuple[Affine, "Node"], ...]], ...]
+Summands = tuple[tuple[Loop, tuple[tuple[Affine, Node], ...]], ...]
 """What loops add up: for each of them places, and the nodes that are added there."""
 
 
@@ -138,17 +138,17 @@ class Stage:
     id: int
     size: int
     loops: Summands
-    terms: tuple[tuple[int, "Node"], ...]
+    terms: tuple[tuple[int, Node], ...]
 
     @property
-    def roots(self) -> "tuple[Node, ...]":
+    def roots(self) -> tuple[Node, ...]:
         """The nodes of all summands."""
         inside = tuple(node for _, entries in self.loops for _, node in entries)
         return inside + tuple(node for _, node in self.terms)
 
     def parts(
-        self, renewed: "Callable[[Node], Node | None]", loop: Callable[[Loop], Loop]
-    ) -> "tuple[Summands, tuple[tuple[int, Node], ...]]":
+        self, renewed: Callable[[Node], Node], loop: Callable[[Loop], Loop]
+    ) -> tuple[Summands, tuple[tuple[int, Node], ...]]:
         """Return the summands with other nodes, without those that become ``None``; and with other loops."""
         loops = tuple(
             (

@@ -28,6 +28,7 @@ SAYS = {
     "bodies.py": ["the same places to 1e-8 au: True", "names are kept: True"],
     "exponents.py": ["accurate: integrators.lyapunov, heyoka"],
     "ensemble.py": ["28% of 10000 orbits are chaotic"],
+    "networks.py": ["network: the same state as SciPy's: True", "grid: the same state as SciPy's: True"],
     "own_campaign.py": ["exit code: 0 report: True", "DOP853"],
     "mass_matrix.py": ["the same trajectory as SciPy's: True", "energy kept: True"],
     "measured_forcing.py": ["steps that end at a knot: 40 of 40"],

@@ -46,7 +46,7 @@ def test_a_long_sum_that_is_written_out_is_told():
         return sum(x**2 / 2 for x in p) + sum((a - b) ** 4 for a, b in pairwise(q))
 
     system = problems.Hamiltonian(energy, dof=700)
-    with pytest.warns(UserWarning, match=r"4,197 operations written out.*m\.sum") as told:
+    with pytest.warns(UserWarning, match=r"4,896 operations written out.*m\.sum") as told:
         # Told before anything is compiled.
         emit.numba(system, "field")
     assert len(told) == 1

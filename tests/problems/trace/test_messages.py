@@ -171,10 +171,6 @@ def index_negative(q, p, m):
     return m.sum(lambda i: q[i - 1], range(2))  # the line
 
 
-def nested_sums(q, p, m):
-    return m.sum(lambda i: m.sum(lambda j: q[i] * q[j], range(2)), range(2))  # the line
-
-
 def sum_of_a_list(q, p, m):
     return m.sum([q[0], q[1]])  # the line
 
@@ -242,7 +238,6 @@ REFUSED: dict[Callable[..., Any], tuple[str, str]] = {
     index_comparison: ("does with its index more than q[a*i + b]", "index list"),
     index_outside: ("q[2] does not exist", "0 to 1"),
     index_negative: ("q[-1] does not exist", "0 to 1"),
-    nested_sums: ("a sum stands inside the term of a sum", "list of tuples"),
     sum_of_a_list: ("m.sum needs a term and an index list", "range(n)"),
     ragged_index: ("not a list of integers or of equally long tuples", "range(n)"),
     fractional_index: ("not a list of integers", "range(n)"),
