@@ -1,4 +1,4 @@
-"""A sparse network of oscillators and a grid of reacting cells, written as loops; SciPy integrates both too."""
+"""A sparse network of oscillators and a grid of reacting cells, written as loops, beside SciPy."""
 
 import numpy as np
 import scipy.sparse
