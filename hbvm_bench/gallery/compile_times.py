@@ -8,7 +8,7 @@ from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.measure import machine
 from hbvm_bench.report.markdown import printed
 from hbvm_bench.summaries.table import Table
-from integrators.kernel.native import field
+from integrators.kernel.native import stages
 from problems import emit
 from problems.problem import Problem
 
@@ -104,7 +104,7 @@ def _compiled(problem: Problem) -> None:
 
 def _on_lanes(problem: Problem) -> None:
     name = "force" if problem.system.separable else "field"
-    field.build(_function(problem, name), LANES)
+    stages.build(_function(problem, name), LANES)
 
 
 def _function(problem: Problem, name: str) -> Any:

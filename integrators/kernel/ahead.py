@@ -3,14 +3,8 @@
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 
-from integrators.kernel.adjoint.engine import pull, record
-from integrators.kernel.ensemble.engine import run, run_own
-from integrators.kernel.events.engine import look
-from integrators.kernel.implicit.engine import solver
-from integrators.kernel.line.engine import line
+from integrators.kernel.engines import follow, line, look, pull, record, run, run_own, solver, steps
 from integrators.kernel.native import lowered
-from integrators.kernel.step.engine import steps
-from integrators.kernel.tangent.engine import follow
 
 ENGINES = {
     "steps": steps,

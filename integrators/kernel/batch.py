@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 
 from integrators.events.finder import Ending
 from integrators.kernel.context import Context
-from integrators.kernel.ensemble.engine import run, run_own
+from integrators.kernel.engines import run, run_own
 from integrators.kernel.ensemble.group import LEFT
 from integrators.kernel.ensemble.prepared import Lanes
 from integrators.kernel.implicit.workspace import Solver
@@ -222,7 +222,7 @@ class _InLanes:
     def advance(self, memory: Any, budget: int) -> int:
         """Go on; return 1 at the end, or 0 after so many steps."""
         group, partial = memory
-        return run(group.address, partial.address, budget)
+        return run(group, partial, budget)
 
     def pace(self) -> Pace:
         """Return how many steps are taken between two looks at Ctrl-C."""
@@ -302,12 +302,12 @@ class Adaptive(_InLanes):
             context.controller.interval = float(abs(self.work.result.t[-1] - self.work.t0))
             self.work.program.limit(context, context.controller.interval)
         group, _ = self.lanes.groups(self.work.t0, self.h, self.numbers, self.arrays)
-        group.point({"contexts": np.array([context.address for context, *_ in contexts])})
+        group.contexts = [context for context, *_ in contexts]
         group.first_length = self.work.program.first or 0.0
         return group, contexts
 
     def advance(self, memory: Any, budget: int) -> int:
-        return run_own(memory[0].address, budget)
+        return run_own(memory[0], budget)
 
     @property
     def steps(self) -> Counts:

@@ -16,13 +16,12 @@ from integrators.events.finder import Ending, ended_by
 from integrators.events.members import ending_of
 from integrators.kernel.batch import Adaptive, Batch, BatchProgram, Work, nothing_yet
 from integrators.kernel.context import Context
+from integrators.kernel.engines import look
 from integrators.kernel.ensemble.group import ACCUMULATES, BY_EVENT
 from integrators.kernel.ensemble.prepared import Lanes
-from integrators.kernel.events.engine import look
 from integrators.kernel.events.functions import Action, EventFunction
 from integrators.kernel.events.search import give_room, room_for, search_memory
 from integrators.kernel.pace import FEWEST, Pace
-from integrators.kernel.step.engine import steps
 from integrators.kernel.stepper import CHUNK_WITH_EVENTS, HBVMStepper, accumulated
 from integrators.protocol import Array, Samples, Status
 from integrators.refusals import check_batch, check_times
@@ -187,20 +186,16 @@ class _Watched(Adaptive):
         end, parameters = float(self.work.result.t[-1]), self.lanes.parameters
         sign = 1.0 if end >= self.work.t0 else -1.0
         group, pairs = super().memory()
-        events = search_memory(
-            search.events, search.functions, search.actions, pairs[0], steps.code().address, end, sign
-        )
+        events = search_memory(search.events, search.functions, search.actions, pairs[0], end, sign)
         room = min(HITS, room_for(max(dim, parameters)))
         give_room(events, room)
         log = _Log.empty(2 * width * room, dim, parameters)
-        group.point(
-            {f"log_{name}": array for name, array in vars(log).items()}
-            | {"partials": np.array([partial.address for _, partial in pairs])}
-        )
-        group.log_room, group.search = 2 * width * room, events.address
+        group.point({f"log_{name}": array for name, array in vars(log).items()})
+        group.partials = [partial for _, partial in pairs]
+        group.log_room, group.search = 2 * width * room, events
         group.renews = int(self.work.program.renews)
         for context, _ in pairs:
-            context.events.code, context.events.memory = look.code().address, events.address
+            context.events.code, context.events.memory = look.code(), events
             context.events.act = int(bool(search.actions))
         return group, pairs, events, log
 

@@ -18,7 +18,7 @@ import problems
 from integrators.kernel.native import machine
 from integrators.kernel.native.field import assembly
 from integrators.kernel.program import HBVMProgram
-from integrators.kernel.tables import WIDE
+from integrators.kernel.routes import WIDE
 from problems import emit
 from problems.problem import Problem
 

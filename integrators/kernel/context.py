@@ -13,12 +13,12 @@ the vector field wants it.
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from integrators.kernel.native.memory import Array, Integer, Memory, Real, Within
+from integrators.kernel.native.memory import Addressed, Array, Integer, Memory, Pointer, Real, Within
 from integrators.kernel.parts.blocks import Blocks
 from integrators.kernel.parts.controller import Controller
 from integrators.kernel.parts.counters import Counters
@@ -34,8 +34,10 @@ from integrators.kernel.parts.scratch import STAGE, Scratch
 from integrators.kernel.parts.solver import Solver
 from integrators.kernel.parts.surfaces import Surfaces
 from integrators.kernel.parts.tables import Tables
-from integrators.kernel.tables import Constants
-from problems.problem import System
+
+if TYPE_CHECKING:  # what compiled code does not depend on
+    from integrators.kernel.tables import Constants
+    from problems.problem import System
 
 Numbers = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -57,6 +59,9 @@ PARTIAL, STOP, DENSE = range(3)
 
 # What solves the step ahead, if anything does: the values, or increments that the implicit solver has found.
 UNSOLVED, BY_VALUES, BY_INCREMENT = range(3)
+
+# What the entry of `step` can do; see `integrators.kernel.step.entry`.
+RESET, ADVANCE, TAKE, PART, GO_ON, ACT = range(6)
 
 # What whole iterations do after the last one, if anything; see `Context.fused`.
 MEASURE, EVALUATE = 1, 2
@@ -81,10 +86,10 @@ class Shape:
         Second-order form: a stage holds positions, the state (q, p).
     unit : bool
         Whether the rows' factors are in the matrix.
-    field : int
-        Address of the vector field.
-    fused : int
-        Address of whole iterations; 0: none.
+    field : Addressed
+        The vector field.
+    fused : Addressed or None
+        Whole iterations, if there are any.
     parameters : int
         Length of the parameter vector.
     block, group : ndarray of int
@@ -96,12 +101,12 @@ class Shape:
     rows: int
     second: bool
     unit: bool
-    field: int
-    fused: int
+    field: Addressed
+    fused: Addressed | None
     parameters: int
     block: Integers
     group: Integers
-    constants: Constants
+    constants: "Constants"
 
     @property
     def dim(self) -> int:
@@ -128,19 +133,20 @@ class Context(Memory):
         Tables by their slot's name; not copied.
     more : mapping of str to number, optional
         What further slots begin with.
+    pointers : mapping of str to Addressed, optional
+        What further slots point to.
     arrays : mapping of str to ndarray, optional
         Arrays that further slots point to.
     """
 
     # --- what is integrated, and how ---
-    field = Integer()  # address of void(times, stages, par, values) on one block of stages
-    fused = Integer()  # address of whole iterations, void(context, count, after); 0: none, see `step.fused`
-    # address of a line integral, int64(operation, context); 0: plain. It makes the VALUES at the stages from
+    field = Pointer()  # void(times, stages, par, values) on one block of stages
+    fused = Pointer()  # whole iterations, void(context, count, after); 0: none, see `step.fused`
+    # A line integral, int64(operation, context); 0: plain. It makes the VALUES at the stages from
     # the field, the state at a step's END, and learns of every new state at which the trajectory has ARRIVEd.
-    line = Integer()
-    # address of int64(operation, context, memory), which vectors follow the steps by; 0: none
-    follow = Integer()
-    follow_memory = Integer()
+    line = Pointer()
+    follow = Pointer()  # int64(operation, context, memory), which vectors follow the steps by; 0: none
+    follow_memory = Pointer()
     parameters = Integer()
     par = Array("parameters")
     rows = Integer()  # components of a stage: dof in second-order form, dim in first-order form
@@ -198,12 +204,13 @@ class Context(Memory):
         tables: Mapping[str, Numbers],
         more: Mapping[str, int] | None = None,
         arrays: Mapping[str, NDArray[Any]] | None = None,
+        pointers: Mapping[str, Addressed | None] | None = None,
     ):
         c, rows = shape.constants, shape.rows
         groups, mode_groups = -(-(c.s + c.first) // 8), -(-c.modes // 8)
         numbers = {
-            "field": shape.field, "fused": shape.fused, "parameters": shape.parameters,
-            "rows": rows, "padded": -(-rows // 8) * 8, "lanes": c.lanes, "calls": -(-c.k // c.lanes),
+            "parameters": shape.parameters, "rows": rows, "padded": -(-rows // 8) * 8, "lanes": c.lanes,
+            "calls": -(-c.k // c.lanes),
             "chunks": -(-c.k // 8), "route": c.route, "second": shape.second, "unit": shape.unit,
             "k": c.k, "s": c.s, "tables.matrix_size": tables["raw_matrix"].size // 8, "tables.groups": groups,
             "tables.first": c.first, "tables.two_steps": int(c.two_steps), "tables.mode_groups": mode_groups,
@@ -212,7 +219,11 @@ class Context(Memory):
             "pace.rows": 0, "pace.parameters": 0,
         }  # fmt: skip
         blocks = {"blocks.of_row": shape.block, "blocks.group": shape.group}
-        super().__init__({**numbers, **(more or {})}, {**_qualified(tables), **blocks, **(arrays or {})})
+        super().__init__(
+            {**numbers, **(more or {})},
+            {**_qualified(tables), **blocks, **(arrays or {})},
+            {"field": shape.field, "fused": shape.fused, **(pointers or {})},
+        )
         self.shape = shape
         self.factors.row[:] = self.blocks.speed[:] = self.blocks.mass[:] = 1.0
         self.factors.kick.reshape(-1, 8)[:, :4] = 1.0
@@ -233,7 +244,7 @@ class Context(Memory):
     def used_tables(self) -> dict[str, Numbers]:
         """The tables of coefficients that it points to."""
         indices = {name: self.word_of[f"tables.{name}"] for name in Tables.slots}
-        return {name: self._pointed[index] for name, index in indices.items() if index in self._pointed}
+        return {name: self.pointed[index] for name, index in indices.items() if index in self.pointed}
 
     def set_factors(self, h: float) -> None:
         """Set h and what is h times the velocities."""
@@ -251,7 +262,7 @@ def _qualified(tables: Mapping[str, Numbers]) -> dict[str, Numbers]:
     return {f"tables.{name}": table for name, table in tables.items()}
 
 
-def blocks(system: System) -> tuple[Integers, Integers]:
+def blocks(system: "System") -> tuple[Integers, Integers]:
     """Return the block of each component, and the group (q or p) of each block.
 
     The change of an iteration is measured relative to the size of a block: the
@@ -266,7 +277,7 @@ def blocks(system: System) -> tuple[Integers, Integers]:
     return block, group
 
 
-def width_of_blocks(system: System) -> int:
+def width_of_blocks(system: "System") -> int:
     """Return how many components a block has: the coordinates of a body, or one."""
     bodies = getattr(system, "bodies", None)
     return bodies.dimension if bodies is not None else 1

@@ -6,8 +6,7 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import ArrayLike
 
-from integrators.kernel.context import ANEW, BUDGET, DENSE, DONE, PARTIAL, STOP
-from integrators.kernel.native import engine
+from integrators.kernel.context import ADVANCE, ANEW, BUDGET, DENSE, DONE, PARTIAL, STOP, Context
 from integrators.kernel.stepper import HBVMStepper
 from integrators.protocol import Array, Samples, Status
 from integrators.refusals import check_state, one_thread
@@ -47,12 +46,12 @@ class FixedStepper(HBVMStepper):
     def _one_step(self) -> bool:
         numbers, call, _ = self._for_one_step
         numbers.view(np.int64)[0] = self._context.n + 1
-        return self._is_one(self._enter(*call), DONE)
+        return self._is_one(self._enter(call), DONE)
 
-    def _one_step_call(self, numbers: int, out: int) -> tuple[int, ...]:
-        own, partial = self._context.address, self._partial.address
+    def _one_step_call(self, numbers: int, out: int) -> tuple[int | Context, ...]:
+        own, partial = self._context, self._partial
         # The time and the part of a step beyond it are of no account: 0.0.
-        return engine.ADVANCE, own, partial, PARTIAL, 1, numbers + 8, numbers, numbers + 8, 0, out, 1
+        return ADVANCE, own, partial, PARTIAL, 1, numbers + 8, numbers, numbers + 8, 0, out, 1
 
     @one_thread
     def take(self, count: int) -> Samples:

@@ -15,21 +15,22 @@ from integrators.kernel.along import batch_along
 from integrators.kernel.batch import Batch, prepare_batch
 from integrators.kernel.batch_events import WithEvents
 from integrators.kernel.context import Context, Shape, blocks, width_of_blocks
+from integrators.kernel.engines import look, solver, steps
 from integrators.kernel.ensemble.prepared import Lanes, compiled_lanes, lanes_of
-from integrators.kernel.events.engine import look
 from integrators.kernel.events.functions import Action, EventFunction
 from integrators.kernel.fixed import FixedStepper
-from integrators.kernel.implicit import engine as solver_engine
 from integrators.kernel.implicit.workspace import SOLVERS, Workspace, linearization
 from integrators.kernel.line.kept import Kept
-from integrators.kernel.native import binary
+from integrators.kernel.native import binary, machine
 from integrators.kernel.native import field as fields
 from integrators.kernel.native.foreign import field_of
 from integrators.kernel.native.memory import aligned
+from integrators.kernel.native.stages import ON_LANES
 from integrators.kernel.parts.implicit import ALWAYS_IMPLICIT
+from integrators.kernel.parts.surfaces import MOST_SURFACES
+from integrators.kernel.simd.emit import WIDTH
 from integrators.kernel.spare import Pair, Spare
 from integrators.kernel.step import fused
-from integrators.kernel.step.engine import steps
 from integrators.kernel.step.rule import (
     LOG_RESIDUAL,
     LOG_RESIDUAL_VARYING,
@@ -160,7 +161,7 @@ class HBVMProgram(Compiled):
         unit = tables.unit(self.constants, self._velocity_scale(np.full(system.n_par, np.nan)))
         self.fused = self._iterations(quantity, rows, lanes) if unit and not self.kept else None
         self.shape = Shape(
-            rows, self.second, unit, self.field.address, self.fused.address if self.fused else 0,
+            rows, self.second, unit, self.field, self.fused,
             system.n_par, block, group, self.constants,
         )  # fmt: skip
         self._fixed = tables.fixed(self.constants)
@@ -182,7 +183,16 @@ class HBVMProgram(Compiled):
         """Return whole iterations for a system with a few rows, if they can be compiled with its field."""
         if rows > fused.ROWS or self.constants.route not in (8, 16) or not self.lanes:
             return None
-        return fused.compile_iterations(self.system, quantity, lanes, rows)
+        by_columns = lanes == WIDTH or machine.many_registers()
+        form = rows, by_columns
+        return fields.compile_around(
+            self.system,
+            quantity,
+            lanes,
+            fused.__name__,
+            form,
+            lambda inner: fused.iterations(inner, lanes, *form),
+        )
 
     @property
     def description(self) -> str:
@@ -209,7 +219,7 @@ class HBVMProgram(Compiled):
     @property
     def lanes(self) -> bool:
         """Whether the vector field runs on all stages at once, or on one after another."""
-        return self.field.note == fields.ON_LANES
+        return self.field.note == ON_LANES
 
     def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> HBVMStepper:
         """Return a stepper at ``t0``; ``par`` defaults to the system's own parameters.
@@ -374,7 +384,7 @@ class HBVMProgram(Compiled):
     def implicit(self) -> Workspace:
         """Return memory for the implicit solver; its code is compiled, or loaded, the first time."""
         if self._workspace is None:
-            native = solver_engine.solver.code()
+            native = solver.code()
             self.from_cache = self.from_cache and native.from_cache
             linear = linearization(self.system, second=self.second)
             self._workspace = Workspace(self.shape, self.solver.kind, linear)
@@ -547,7 +557,7 @@ class AdaptiveProgram(HBVMProgram):
         # As much as rounding accounts for, and without a bound on the quadrature what the tolerance allows.
         self._negligible = LEAST_NEGLIGIBLE if quadrature_error is not None else max(tol, LEAST_NEGLIGIBLE)
         surfaces = (
-            sides(system.function("force" if self.second else "field"))
+            sides(system.function("force" if self.second else "field"), MOST_SURFACES)
             if system.traced and not self.kept
             else None
         )
@@ -636,7 +646,7 @@ class AdaptiveProgram(HBVMProgram):
         context = super()._new_context(partial=True)  # with a matrix of its own
         context.solver.log_residual = LOG_RESIDUAL_VARYING
         if self._energy:
-            context.energy.code = self._energy.address
+            context.energy.code = self._energy
             context.energy.width = width_of_blocks(self.system)
             context.point({"energy.state_indices": self.shape.state_indices})
             context.solver.tolerance = max(PART_OF_TOLERANCE * self.tol, TOLERANCE)
@@ -662,7 +672,7 @@ class AdaptiveProgram(HBVMProgram):
             context.estimate.quadrature_error_decay = self.quadrature_error ** (0.5 / last)
         context.discontinuities.doubt, context.discontinuities.slowest_decay = self._doubt, self._slowest
         context.discontinuities.negligible = self._negligible
-        context.surfaces.code = self._sides.address if self._sides else 0
+        context.surfaces.code = self._sides
         context.surfaces.count = self._surfaces
         context.estimate.absolute[:] = self._absolute
         context.estimate.asks = int(self.atol is None or np.any(np.greater(self.atol, 0.0)))
@@ -715,7 +725,7 @@ class ReversibleProgram(AdaptiveProgram):
         """Put what a trajectory from (t0, y) begins with besides into its memory."""
         super().begin(pair, y, par, t0)
         context = pair.own
-        context.pace.code = self._pace.address
+        context.pace.code = self._pace
         ahead = self._ordinary.start(y, par, t0).take(SCOUTED)
         states = np.concatenate([y[np.newaxis], ahead.y]).T
         times = np.append(t0, ahead.t)

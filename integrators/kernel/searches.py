@@ -7,7 +7,7 @@ import numpy as np
 from integrators.events.event import Event
 from integrators.events.finder import EventLog
 from integrators.kernel.context import DONE
-from integrators.kernel.events.engine import look
+from integrators.kernel.engines import look
 from integrators.kernel.events.functions import Action, EventFunction
 from integrators.kernel.events.memory import START
 from integrators.kernel.events.search import KernelSearch, room_for
@@ -22,7 +22,7 @@ class LastingSearch(KernelSearch):
 
     Parameters
     ----------
-    events, functions, actions, steps, end
+    events, functions, actions, end
         As of `KernelSearch`.
     pair : Pair
         The memory of the trajectory, which keeps that of the search.
@@ -32,13 +32,13 @@ class LastingSearch(KernelSearch):
 
     def __init__(
         self, events: Mapping[str, Event], functions: Sequence[EventFunction], actions: Mapping[str, Action],
-        pair: Pair, steps: int, end: float,
+        pair: Pair, end: float,
     ):  # fmt: skip
         before = pair.searched
         if before is not None and before.functions is functions:
             self._take_over(before, events, functions, actions, pair, end)
             return
-        super().__init__(events, functions, actions, (pair.own, pair.partial), steps, end)
+        super().__init__(events, functions, actions, (pair.own, pair.partial), end)
         pair.searched = Searched(functions, self._memory)
 
     def _take_over(
@@ -58,8 +58,7 @@ class LastingSearch(KernelSearch):
         if self._look(START) != DONE:
             error = self._error
             raise UserError(error) from error
-        pair.own.point({"events.memory": memory.words})
-        numbers.code = look.code().address
+        numbers.code, numbers.memory = look.code(), memory
         numbers.act, numbers.acted = int(bool(actions)), -memory.sign * np.inf
 
     def give_when_over(self, spare: Spare, pair: Pair) -> None:

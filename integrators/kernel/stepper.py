@@ -3,7 +3,7 @@
 import math
 import threading
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from operator import attrgetter
@@ -17,27 +17,29 @@ from integrators.events.event import Event
 from integrators.kernel.adjoint.gradient import Adjoint, Records
 from integrators.kernel.context import (
     ACCUMULATE,
+    ADVANCE,
     ANEW,
     BUDGET,
     DONE,
+    GO_ON,
     HALTED,
     NOT_FINITE,
     NOT_KEPT,
     RENEW,
+    RESET,
     SCATTERED,
     Context,
 )
+from integrators.kernel.engines import solver, steps
 from integrators.kernel.events.functions import Action, EventFunction
-from integrators.kernel.implicit import engine as solver_engine
 from integrators.kernel.implicit.workspace import Solver, Workspace, report
 from integrators.kernel.line.kept import Kept
-from integrators.kernel.native import binary, engine
+from integrators.kernel.native import binary
 from integrators.kernel.native.memory import address
 from integrators.kernel.pace import FEWEST, Pace
 from integrators.kernel.parts.implicit import ALWAYS_IMPLICIT, AUTO, FOR_VECTORS, NOT_WANTED
 from integrators.kernel.searches import LastingSearch
 from integrators.kernel.spare import Pair, Spare
-from integrators.kernel.step.engine import steps
 from integrators.kernel.tables import Constants
 from integrators.kernel.tangent.group import Directions
 from integrators.kernel.tangent.vectors import Vectors
@@ -193,8 +195,7 @@ class HBVMStepper(ABC):
     ) -> None:  # fmt: skip
         """Look for events in all steps from here on, up to a time."""
         assert self._pair is not None
-        code = steps.code().address
-        self.search = LastingSearch(events, functions, actions, self._pair, code, end)
+        self.search = LastingSearch(events, functions, actions, self._pair, end)
         self._pace = Pace(CHUNK_WITH_EVENTS, self._dim)
         self._pace.steps = FEWEST
 
@@ -274,7 +275,7 @@ class HBVMStepper(ABC):
         ctx.numbers.t0 = t0
         for workspace in self._implicit or ():
             workspace.forget()
-        steps(engine.RESET, ctx.address, 0, 0, 0, 0, 0, 0, 0, address(y), 0)
+        steps(RESET, ctx, 0, 0, 0, 0, 0, 0, 0, address(y), 0)
 
     @property
     def t(self) -> float:
@@ -385,8 +386,7 @@ class HBVMStepper(ABC):
         if self._implicit is None:
             self._implicit = (self._program.implicit(), self._program.implicit())
             for context, workspace in zip((self._context, self._partial), self._implicit, strict=True):
-                context.implicit.code = solver_engine.solver.code().address
-                context.implicit.memory = workspace.address
+                context.implicit.code, context.implicit.memory = solver.code(), workspace
                 context.implicit.target_corrections = workspace.target_corrections
                 context.point({"implicit.increment": workspace.increment})
             if self._vectors:
@@ -423,13 +423,14 @@ class HBVMStepper(ABC):
         return outcome != BUDGET
 
     @cached_property
-    def _for_one_step(self) -> tuple[Array, tuple[Any, ...], Array]:
+    def _for_one_step(self) -> tuple[Array, Callable[[], int], Array]:
         """Two numbers that one step reads, what the kernel is called with for it, and where it writes."""
         numbers, states = np.zeros(2), np.empty((2, self._dim))
-        return numbers, self._one_step_call(address(numbers), address(states)), states
+        call = steps.prepared(*self._one_step_call(address(numbers), address(states)))
+        return numbers, call, states
 
     @abstractmethod
-    def _one_step_call(self, numbers: int, out: int) -> tuple[int, ...]:
+    def _one_step_call(self, numbers: int, out: int) -> tuple[int | Context, ...]:
         """Return what the kernel is called with for one step, with the addresses of numbers and of states."""
 
     @abstractmethod
@@ -546,7 +547,7 @@ class HBVMStepper(ABC):
         late = perf_counter() + self.time_limit
         while outcome == BUDGET and reason is None and not (count and perf_counter() > late):
             before = ctx.counters.steps
-            outcome = self._call(engine.ADVANCE, between, times, out, count, self._budget(), *addresses)
+            outcome = self._call(ADVANCE, between, times, out, count, self._budget(), *addresses)
             count = ctx.samples_written
             if outcome == BUDGET:
                 reason = self._ended(ctx.counters.steps - before)
@@ -578,15 +579,17 @@ class HBVMStepper(ABC):
                 self._take_implicit()
         with self._pace:
             outcome = self._enter(
-                operation, self._context.address, self._partial.address, between, times.size,
-                address(times), targets, parts, written, address(out), budget,
+                steps.prepared(
+                    operation, self._context, self._partial, between, times.size,
+                    address(times), targets, parts, written, address(out), budget,
+                )
             )  # fmt: skip
         return self._handled(outcome)
 
-    def _enter(self, *arguments: int) -> int:
+    def _enter(self, call: Callable[[], int]) -> int:
         """Return how the kernel came back."""
         try:
-            return steps(*arguments)
+            return call()
         except UserError as raised:
             self.error = raised.error
             return NOT_FINITE
@@ -596,7 +599,7 @@ class HBVMStepper(ABC):
         if outcome == RENEW:
             assert self.search is not None
             self._renew(self.search.parameters)
-            outcome = self._enter(engine.GO_ON, self._context.address)
+            outcome = self._enter(steps.prepared(GO_ON, self._context))
             if outcome == DONE:
                 outcome = BUDGET if self._program.varying else ANEW
         if self.stop is not None and self.stop.is_set():

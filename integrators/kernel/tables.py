@@ -19,18 +19,15 @@ from numpy.typing import NDArray
 
 from integrators.kernel.native import binary, store
 from integrators.kernel.native.memory import aligned
+from integrators.kernel.routes import PER_OCTAVE, THROUGH, WIDE
 from problems.double_double import DD
 
 Array = NDArray[np.float64]
-
-# Routes of a product that are not a number of columns: a larger matrix, and by way of coefficients.
-WIDE, THROUGH = 0, 1
 
 # Coefficients that are extrapolated. P_j(2) grows like 5.8^j: with more, that amplifies rounding more than
 # it helps. Adaptive steps are long, and what they leave out is larger than that.
 MODES, MODES_VARYING = 13, 16
 MOMENTS = 3
-PER_OCTAVE = 32
 _UP = 1.0 + np.arange(PER_OCTAVE + 1) / PER_OCTAVE
 RATIOS = np.append(0.5 * _UP[:-1], _UP)
 """Adaptive steps are so many times as long as the step before, with up to 16 stages, where nothing
@@ -107,11 +104,7 @@ def constants(k: int, s: int, second: bool, lanes: int) -> Constants:
     """
     route = route_for(k, s, lanes)
     shapes = _shapes(k, s, route)
-    name = store.key(
-        "tables",
-        f"{k} {s} {second} {route}",
-        binary.sources("tables", "../coefficients/legendre", "../../problems/double_double"),
-    )
+    name = store.key("tables", f"{k} {s} {second} {route}", binary.sources(__name__))
     kept = store.get(name)
     if kept is None or len(kept) != 8 * sum(rows * columns for rows, columns in shapes):
         parts = _make(k, s, second, route)

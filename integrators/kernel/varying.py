@@ -14,11 +14,11 @@ from integrators.kernel.context import (
     PARTIAL,
     SLIDING,
     STOP,
+    TAKE,
     UNDERFLOW,
     UNSCALED,
     Context,
 )
-from integrators.kernel.native import engine
 from integrators.kernel.parts.discontinuities import MOST_RECORDED, NOTHING, START
 from integrators.kernel.step.rule import FIRST_AT_REST, RESTART, SCALE_LASTS
 from integrators.kernel.stepper import Ended, HBVMStepper, Program
@@ -86,11 +86,11 @@ class AdaptiveStepper(HBVMStepper):
             return False
         ends, call, _ = self._for_one_step
         ends[0] = LATEST if self._context.controller.next_length > 0.0 else -LATEST
-        return self._is_one(self._enter(*call), BUDGET)
+        return self._is_one(self._enter(call), BUDGET)
 
-    def _one_step_call(self, numbers: int, out: int) -> tuple[int, ...]:
-        own, partial = self._context.address, self._partial.address
-        return engine.TAKE, own, partial, PARTIAL, 2, numbers, 0, 0, 0, out, 1
+    def _one_step_call(self, numbers: int, out: int) -> tuple[int | Context, ...]:
+        own, partial = self._context, self._partial
+        return TAKE, own, partial, PARTIAL, 2, numbers, 0, 0, 0, out, 1
 
     @one_thread
     def take(self, count: int) -> Samples:
@@ -358,7 +358,7 @@ class AdaptiveStepper(HBVMStepper):
             times, out = np.full(n + 1, stop if passes else end), np.empty((n + 1, self._dim))
             if self._vectors:
                 self._vectors.room(n + 1)
-            outcome = self._call(engine.TAKE, PARTIAL, times, out, 0, n)
+            outcome = self._call(TAKE, PARTIAL, times, out, 0, n)
             outcome = BUDGET if outcome == ANEW else outcome
             count = self._context.samples_written
             steps += count

@@ -3,8 +3,6 @@
 import math
 from typing import Protocol
 
-from integrators.protocol import Destination
-
 STALL_STEPS = 200_000
 """Steps after which a method must have got somewhere."""
 
@@ -111,15 +109,18 @@ class StallDetector:
         )
 
 
-class Watched(Destination, Protocol):
+class Watched(Protocol):
     """A stepper that is watched on its way.
 
     Attributes
     ----------
+    destination : float or None
+        As of `integrators.protocol.Destination`.
     detector : StallDetector or None
         Its detector, if it has a destination; kept here from piece to piece.
     """
 
+    destination: float | None
     detector: StallDetector | None
 
 

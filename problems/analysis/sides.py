@@ -6,11 +6,10 @@ from problems.analysis.structure import WITHOUT_END, has_kink
 from problems.calculus.function import Function, Term
 from problems.trace.graph import STATE, Node, T, Table, reachable
 
-MOST = 16  # surfaces whose distances have an output of their own
 GOLDEN = (5.0**0.5 - 1.0) / 2.0  # multiples of it are far from equal sums
 
 
-def sides(field: Function) -> Function | None:
+def sides(field: Function, most: int) -> Function | None:
     """Return a function whose first value changes where a condition, a sign or a piece of a table does.
 
     Parameters
@@ -18,12 +17,14 @@ def sides(field: Function) -> Function | None:
     field : Function
         Of a system; conditions in time alone do not count, see `problems.analysis.switches`, except those
         of a rounded number, which have no end.
+    most : int
+        Surfaces whose distances have an output of their own.
 
     Returns
     -------
     Function or None
         Its first output is the same everywhere between two switching surfaces. In a loop, sides that change
-        in two terms at once and in opposite directions may cancel. Each of the others, `MOST` at most,
+        in two terms at once and in opposite directions may cancel. Each of the others, ``most`` of them,
         vanishes on one surface and is smooth beside it; on those of a loop, and on those that are left, one
         of them vanishes that is of the size of the smallest. ``None`` where the field has no such surface.
     """
@@ -40,9 +41,9 @@ def sides(field: Function) -> Function | None:
         for i, node in enumerate(dict.fromkeys(conditions))
     )
     distances = list(dict.fromkeys(_distance(node) for node in conditions))
-    if len(distances) > MOST:
-        last = [_inverse_square(node) for node in distances[MOST - 1 :]]
-        distances[MOST - 1 :] = [_smallest(sum(last[1:], last[0]))]
+    if len(distances) > most:
+        last = [_inverse_square(node) for node in distances[most - 1 :]]
+        distances[most - 1 :] = [_smallest(sum(last[1:], last[0]))]
     outputs = (terms, *((Term(node, 0),) for node in distances))
     return replace(field, outputs=outputs, loops=(), name="sides")
 

@@ -15,6 +15,7 @@ from integrators.kernel import program
 from integrators.kernel.native import engine, foreign
 from integrators.protocol import Status
 from tests.faults.fault import Fault, is_met
+from tests.faults.search import shared_memory
 
 KEPLER = problems.load("kepler")
 
@@ -209,3 +210,28 @@ def test_a_child_forked_beside_a_compilation_does_not_hang():
         [sys.executable, "-c", FORK], capture_output=True, text=True, timeout=150, check=True
     )
     assert done.stdout.strip() == "child 7", done.stderr
+
+
+def in_a_fresh_process(*options):
+    """Return what `tests.faults.search.shared_memory` prints of options, each in a process of its own."""
+    done = []
+    for option in options:
+        command = [sys.executable, "-m", "tests.faults.search.shared_memory", option]
+        ran = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+        done.append((option, ran.stdout.strip() or f"exit {ran.returncode}: {ran.stderr[-500:]}"))
+    return done
+
+
+QUICK = ("fixed steps and actions", "events in Python")
+
+
+def test_threads_of_the_first_call_of_a_process_make_the_trajectories_of_one():
+    """Before, a half of the first differed, or the process crashed: tables of one thread were freed."""
+    assert in_a_fresh_process(*QUICK) == [(option, f"{option} 0") for option in QUICK]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("option", shared_memory.OPTIONS)
+def test_so_they_do_with_every_option(option):
+    for _ in range(3):
+        assert in_a_fresh_process(option) == [(option, f"{option} 0")]

@@ -3,10 +3,10 @@
 import numpy as np
 
 from integrators.kernel import tables
-from integrators.kernel.adjoint.engine import pull, record
 from integrators.kernel.adjoint.memory import HEAD, Pullback, Tape
 from integrators.kernel.adjoint.tableau import adjoint
 from integrators.kernel.context import DONE, Context, Shape
+from integrators.kernel.engines import pull, record
 from integrators.kernel.native.field import compile_field
 from integrators.kernel.native.memory import aligned
 from integrators.kernel.step.rule import FIRST_RATE, LOG_RESIDUAL_VARYING, TOLERANCE
@@ -32,8 +32,7 @@ class Records:
 
     def attach(self, context: Context) -> None:
         """Let the steps of a trajectory be recorded here."""
-        context.point({"follow_memory": self.tape.words})  # keeps it alive
-        context.follow = record.code().address
+        context.follow, context.follow_memory = record.code(), self.tape
 
     def __len__(self) -> int:
         assert not self.tape.full
@@ -91,9 +90,7 @@ class Adjoint:
         field = compile_field(system, (-system.product("state")).named("adjoint"), c.lanes)
         halves = 1 if system.dof is None else 2
         block = np.arange(dim) // (dim // halves)
-        own = Shape(
-            dim, False, True, field.address, 0, system.n_par, block, np.arange(halves), self._constants
-        )
+        own = Shape(dim, False, True, field, None, system.n_par, block, np.arange(halves), self._constants)
         fixed = tables.fixed(self._constants)
         if c.route != tables.THROUGH:
             fixed["raw_matrix"] = tables.rounded(self._constants)
@@ -110,7 +107,7 @@ class Adjoint:
         wanted = system.n_par if self._wanted else 0
         self._memory = Pullback({"parameters": wanted, "room": wanted * c.lanes, "states": dim}, {})
         if wanted:
-            self._memory.slopes = compile_field(system, system.product("parameters"), c.lanes).address
+            self._memory.slopes = compile_field(system, system.product("parameters"), c.lanes)
 
     def begin(self, gradient: Array) -> None:
         """Set the gradient with respect to the end; those with respect to the parameters go on adding up."""
@@ -134,7 +131,7 @@ class Adjoint:
         blocks[:] = padded.reshape(n, dim, calls, c.lanes).swapaxes(1, 2)
         memory.point({"heads": heads, "stages": room})
         memory.count, memory.next = n, 0
-        while pull(self.context.address, memory.address) != DONE:
+        while pull(self.context, memory) != DONE:
             self._solve(heads[memory.next], stages[memory.next])
             memory.next += 1
 

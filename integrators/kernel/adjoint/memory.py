@@ -1,6 +1,6 @@
 """What recorded steps, and their adjoints, keep in memory; see `integrators.kernel.native.memory`."""
 
-from integrators.kernel.native.memory import Array, Integer, Memory
+from integrators.kernel.native.memory import Array, Integer, Memory, Pointer
 
 HEAD = 8  # doubles of a record before its stages: t0, time_low, n and h of its step, and room
 
@@ -23,7 +23,7 @@ class Pullback(Memory):
     heads = Array()  # `HEAD` doubles for each
     stages = Array()  # of each, the last stage first, as the rows that follow those of the adjoint
     states = Integer()  # how many
-    slopes = Integer()  # address of the products with derivatives by parameters; 0: not wanted
+    slopes = Pointer()  # the products with derivatives by parameters; 0: not wanted
     parameters = Integer()
     values = Array("room")  # of these products, in one block of stages
     room = Integer()

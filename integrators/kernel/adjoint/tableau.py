@@ -3,7 +3,8 @@
 from dataclasses import replace
 from functools import lru_cache
 
-from integrators.kernel.tables import THROUGH, Constants
+from integrators.kernel.routes import THROUGH
+from integrators.kernel.tables import Constants
 from problems.double_double import DD
 
 

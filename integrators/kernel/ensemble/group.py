@@ -4,7 +4,7 @@ A row holds one number of every trajectory, side by side. Arrays of rows are dec
 number of rows first; `lanes` is the length of a row.
 """
 
-from integrators.kernel.native.memory import Array, Integer, Memory, Real
+from integrators.kernel.native.memory import Array, Integer, Memory, Pointer, Pointers, Real
 
 # How a trajectory has left its lane: to go by itself from its start, at its last time, where events
 # accumulate, or, from BY_EVENT on, ended by the first event, the second, ...
@@ -15,7 +15,7 @@ class Group(Memory):
     """As many trajectories as a vector has lanes, their present step, and what is to be done with them."""
 
     # --- what is integrated, and how ---
-    code = Integer()  # address of void(group, count): see `ensemble.steps`
+    code = Pointer()  # void(group, count): see `ensemble.steps`
     lanes = Integer()
     rows = Integer()  # components of a stage: dof in second-order form, dim in first-order form
     dim = Integer()
@@ -120,7 +120,7 @@ class Group(Memory):
     sample = Integer()  # the next one to be made; -1: the group is not loaded
 
     # --- or one in each lane after another; see `ensemble.own` ---
-    contexts = Array(kind=int)  # (lanes): address of a `Context` for each lane
+    contexts = Pointers()  # (lanes): a `Context` for each lane
     start_time = Real()
     first_length = Real()  # of the first step; 0: what the field there suggests
     member = Array("lanes", kind=int)  # which trajectory is on a lane; -1: none
@@ -131,8 +131,8 @@ class Group(Memory):
 
     # --- events in the steps of these; see `ensemble.watch` ---
     events = Integer()  # how many; 0: nobody looks
-    search = Integer()  # address of a `Search`, which looks into one lane after another
-    partials = Array(kind=int)  # (lanes): address of a `Context` for partial steps of each lane
+    search = Pointer()  # a `Search`, which looks into one lane after another
+    partials = Pointers()  # (lanes): a `Context` for partial steps of each lane
     renews = Integer()  # 1: other parameters change no velocities, and actions may set them in lanes
     function_values = Array("events", "lanes")  # of each lane, one after another: `Search.ends`,
     function_zeros = Array("events", "lanes")  # `Search.touched`,

@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 
 from integrators.kernel import tables
 from integrators.kernel.context import width_of_blocks
-from integrators.kernel.ensemble.engine import run, run_own
+from integrators.kernel.engines import run, run_own
+from integrators.kernel.ensemble import steps
 from integrators.kernel.ensemble.group import Group
-from integrators.kernel.ensemble.steps import Blocks, Form, compile_steps
+from integrators.kernel.ensemble.steps import Blocks, Form, Steps
 from integrators.kernel.native import binary, machine
+from integrators.kernel.native.field import compile_around
 from integrators.kernel.native.memory import Numbers, aligned
 from integrators.kernel.tables import Constants
 from problems import emit
@@ -72,7 +74,15 @@ class Lanes:
         form = Form(
             self.width, self.k, self.rows, second, self.unit, varying, unrolled, judged, groups, vectors
         )
-        self._code = compile_steps(system, form, quantity)
+        self._code = compile_around(
+            system,
+            quantity,
+            form.lanes,
+            steps.__name__,
+            form,
+            lambda inner: Steps(inner, form).text(),
+            par=True,
+        )
         loop = (run_own if varying else run).code()
         self.from_cache = self._code.from_cache and loop.from_cache
         self._scaled: dict[float, Numbers] = {}
@@ -142,11 +152,12 @@ class Lanes:
             What `Group` is to know of the trajectories.
         """
         shape = {
-            "code": self._code.address, "lanes": self.width, "rows": self.rows, "dim": self.dim,
+            "lanes": self.width, "rows": self.rows, "dim": self.dim,
             "parameters": self.parameters, "k": self.k, "events": 0, **numbers,
         }  # fmt: skip
         matrix = self._matrix(h)
-        group, partial = (Group(shape, {**self._fixed, **arrays, "matrix": matrix}) for _ in range(2))
+        held = {**self._fixed, **arrays, "matrix": matrix}
+        group, partial = (Group(shape, held, {"code": self._code}) for _ in range(2))
         group.matrix_norm = float(_norm(matrix))
         group.h[:], group.t0[:] = h, t0
         group.start_time = t0

@@ -18,7 +18,7 @@ from llvmlite import ir
 from integrators.kernel.ensemble.control import Control
 from integrators.kernel.ensemble.group import Group
 from integrators.kernel.ensemble.writer import Index, Writer
-from integrators.kernel.native import binary, field, machine, store
+from integrators.kernel.native import machine
 from integrators.kernel.simd.emit import DOUBLE, INTEGER, splat, text_of
 from integrators.kernel.simd.operations import where
 from integrators.kernel.simd.values import Value
@@ -28,8 +28,6 @@ from integrators.kernel.step.rule import (
     MOST_IN_LANES,
     TOLERANCE,
 )
-from problems import emit
-from problems.systems.base import System
 
 INFINITY = float("inf")
 ROWS_AT_A_TIME = 2  # rows of a product side by side: their sums stay in registers, and share its matrix
@@ -76,38 +74,8 @@ class Form:
     vectors: Blocks = ()
 
 
-def compile_steps(system: System, form: Form, quantity: emit.Quantity) -> binary.Native:
-    """Compile ``void(group, count)``, or load it: as many steps of a `Group`, for a field on lanes.
-
-    Parameters
-    ----------
-    system : System
-        Whose function the steps evaluate.
-    form : Form
-        Of the steps.
-    quantity : str or Function
-        The function, as for `field.compile_field`.
-
-    Raises
-    ------
-    numba.NumbaError
-        If the field cannot be compiled on lanes.
-    """
-    source = emit.source(system, quantity, "numba")
-    modules = binary.sources(*field.SOURCES, "ensemble", "step")
-    name = store.key("ensemble", source.text, repr(form), modules)
-
-    def make() -> tuple[str, bytes]:
-        function, arguments = field.on_lanes(emit.numba(system, quantity).py_func, form.lanes, par=True)
-        return field.ON_LANES, binary.build(
-            function, arguments, around=lambda inner: Steps(inner, form).text()
-        )
-
-    return binary.obtain(name, make)
-
-
 class Steps(Writer):
-    """Writes LLVM's text of what `compile_steps` promises, around the compiled field ``inner``."""
+    """Writes LLVM's text of ``void(group, count)``, so many steps of a `Group`, around a field on lanes."""
 
     # Where the arrays of `Group` are, by their names there.
     nodes: Any

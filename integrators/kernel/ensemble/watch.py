@@ -8,14 +8,13 @@ would need Python, for the reason of a failure or for more room, the trajectory 
 itself.
 """
 
-from integrators.kernel.context import ACCUMULATE, ACTS, BY_VALUES, DONE, HALTED, RENEW
+from integrators.kernel.context import ACCUMULATE, ACT, ACTS, BY_VALUES, DONE, GO_ON, HALTED, RENEW
 from integrators.kernel.ensemble.group import ACCUMULATES, BY_EVENT, LEFT
 from integrators.kernel.ensemble.lane import clear, context_at, fetch, state_index, unload, write, write_until
 from integrators.kernel.events.actions import earlier
 from integrators.kernel.events.memory import START, TERMINAL, WHOLE, Search
 from integrators.kernel.events.value import call_entry
 from integrators.kernel.native.attributes import view
-from integrators.kernel.native.engine import ACT, GO_ON
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.parts.discontinuities import EXTRAPOLATED, NOTHING
 from integrators.kernel.simd.memory import call_look, get, put
@@ -232,7 +231,7 @@ def act(group, lane, ctx, search):
 @compiled
 def call_step(search, operation):
     """Call the compiled steps of single trajectories for the lane that the search looks into."""
-    return call_entry(search.steps, operation, search.own, search.partial, search.asked, search.action_state)
+    return call_entry(search.steps, operation, search.own, search.partial, search.part, search.action_state)
 
 
 @compiled

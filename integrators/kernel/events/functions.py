@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from integrators.kernel.native import binary, raised, store
-from integrators.kernel.native.field import SOURCES, build
+from integrators.kernel.native.field import BUILT_BY
+from integrators.kernel.native.stages import build
 from problems import Problem, emit
 from problems.calculus.function import Function
 from problems.errors import InputError
@@ -36,6 +37,8 @@ class EventFunction:
     ----------
     address : int
         Of the C function.
+    calls_back : bool
+        Whether Python runs it.
 
     Raises
     ------
@@ -53,6 +56,7 @@ class EventFunction:
             self._alive, self.address = _called_back(self._call)
         else:
             self.address = _compiled(traced).address
+        self.calls_back = hasattr(self, "_alive")
 
     @property
     def error(self) -> BaseException | None:
@@ -123,6 +127,8 @@ class Action:
     address : int
         Of the C function, of dim values, or dim + n_par where it changes parameters; the state in the first
         lane is the one that counts.
+    calls_back : bool
+        Whether Python runs it.
 
     Raises
     ------
@@ -147,6 +153,7 @@ class Action:
             self._alive, self.address = _called_back(self._call)
         else:
             self.address = _compiled(traced).address
+        self.calls_back = hasattr(self, "_alive")
 
     @property
     def error(self) -> BaseException | None:
@@ -188,7 +195,6 @@ def _called(
 
 def _called_back(call: Callable[..., None]) -> tuple[Any, int]:
     """Return what keeps a Python function alive that compiled code calls, and its address."""
-    raised.expect_callbacks()
     alive = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 4)(call)
     address = ctypes.cast(alive, ctypes.c_void_p).value
     assert address is not None
@@ -209,7 +215,7 @@ def _numbers(address: int, count: int) -> Any:
 def _compiled(traced: Function) -> binary.Native:
     """Compile a traced function on lanes, or load it."""
     text, function = emit.numba_of(traced, "event")
-    name = store.key("event", text, binary.sources(*SOURCES))
+    name = store.key("event", text, binary.sources(BUILT_BY))
     return binary.obtain(name, lambda: build(function, LANES))
 
 

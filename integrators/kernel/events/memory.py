@@ -1,6 +1,6 @@
 """What a search for events keeps in memory, by name; see `integrators.kernel.native.memory`."""
 
-from integrators.kernel.native.memory import Array, Integer, Memory, Real
+from integrators.kernel.native.memory import Array, Backward, Integer, Memory, Pointer, Pointers, Real
 
 FINE = 8  # points between two samples of a function where its zeros are looked for
 FINEST = 256  # samples in a step, or in a part of one, that are not exceeded
@@ -24,9 +24,9 @@ class Search(Memory):
 
     # --- what is looked for ---
     count = Integer()  # events
-    functions = Array("count", kind=int)  # addresses of void(times, states, par, values), on eight states
+    functions = Pointers()  # void(times, states, par, values), on eight states
     directions = Array("count", kind=int)  # 1, -1, or 0 for all
-    actions = Array("count", kind=int)  # addresses of functions like those, that make a new state; 0: none
+    actions = Pointers()  # functions like those, that make a new state; 0: none
     last = Real()  # the time up to which is looked, where some do
     sign = Real()  # of the direction of time
     limits = Array("count", kind=int)  # the occurrence that ends the integration; 0: none
@@ -35,14 +35,13 @@ class Search(Memory):
     terms = Integer()  # of the step's polynomial
     chunks = Integer()  # of eight first samples
     degree = Integer()  # of the polynomials through the first samples; a power of 2
-    steps = Integer()  # address of the compiled steps, for partial ones
-    own = Integer()  # address of the trajectory's context
-    partial = Integer()  # address of that for partial steps
-    asked = Integer()  # address of `part`
-    part = Real()  # length of the partial step ...
-    part_known = Real()  # ... and of the last one from the same state, if there was one
+    steps = Pointer()  # the compiled steps, for partial ones
+    own = Backward()  # the trajectory's context
+    partial = Pointer()  # that for partial steps
+    # Length of the partial step, and of the last one from the same state, or 0 if there was none
+    part = Array(2)
     cosines = Array()  # of the angles pi i / (FINE FINEST)
-    transforms = Array(kind=int)  # addresses of tables, samples -> coefficients, by an eighth of the degree
+    transforms = Pointers()  # tables, samples -> coefficients, by an eighth of the degree
     first_weights = Array(16, "terms", "chunks")  # `weights` at the first samples of a whole step
 
     # --- what lasts from step to step ---

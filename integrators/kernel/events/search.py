@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from integrators.events.event import Event
 from integrators.events.finder import EventLog
 from integrators.kernel.context import DONE, Context
-from integrators.kernel.events.engine import look
+from integrators.kernel.engines import look, steps
 from integrators.kernel.events.functions import Action, EventFunction
 from integrators.kernel.events.memory import (
     FINE,
@@ -36,8 +36,8 @@ LASTING = ("ends", "touched", "finite", "happened", "due", "due_directions", "ac
 
 
 @lru_cache(maxsize=1)
-def _tables() -> tuple[Array, list[Array], NDArray[np.int64]]:
-    """Return cosines, tables from samples to coefficients of Chebyshev polynomials, and where these are.
+def _tables() -> tuple[Array, tuple[Array, ...]]:
+    """Return cosines, and tables from samples to coefficients of Chebyshev polynomials.
 
     The coefficients follow by the discrete cosine transform. Row i of a table is for sample i.
     """
@@ -55,18 +55,18 @@ def _tables() -> tuple[Array, list[Array], NDArray[np.int64]]:
         table.reshape(degree + 1, width)[:, : degree + 1] = table_
         tables[degree // LEAST] = table
         degree *= 2
-    return cosines, tables, np.array([table.ctypes.data for table in tables])
+    return cosines, tuple(tables)
 
 
 def search_memory(
     events: Mapping[str, Event], functions: Sequence[EventFunction], actions: Mapping[str, Action],
-    contexts: tuple[Context, Context], steps: int, end: float, sign: float,
+    contexts: tuple[Context, Context], end: float, sign: float,
 ) -> Search:  # fmt: skip
     """Return the memory of a search, without room for what it finds.
 
     Parameters
     ----------
-    events, functions, actions, contexts, steps, end
+    events, functions, actions, contexts, end
         As of `KernelSearch`.
     sign : {1.0, -1.0}
         The direction of time.
@@ -76,16 +76,15 @@ def search_memory(
     degree = 1 << (min(max(2 * own.s, LEAST), MOST) - 1).bit_length()
     numbers = {
         "count": len(events), "dim": dim, "degree": degree, "chunks": degree // 8, "terms": own.s,
-        "steps": steps, "own": own.address, "partial": partial.address,
         "parameters": n_par, "made_rows": 1 + dim + n_par, "last": end, "sign": sign,
     }  # fmt: skip
-    cosines, _, transforms = _tables()
-    memory = Search(numbers, {"cosines": cosines, "transforms": transforms})
-    memory.asked = memory.address + 8 * Search.part.index
-    memory.functions[:] = [function.address for function in functions]
+    cosines, transforms = _tables()
+    memory = Search(numbers, {"cosines": cosines})
+    memory.own, memory.partial, memory.steps = own, partial, steps.code()
+    memory.transforms, memory.functions = transforms, functions
+    memory.actions = [actions.get(name) for name in events]
     memory.directions[:] = [event.direction for event in events.values()]
     memory.limits[:] = [event.last for event in events.values()]
-    memory.actions[:] = [actions[name].address if name in actions else 0 for name in events]
     return memory
 
 
@@ -121,8 +120,6 @@ class KernelSearch:
         Of those that change the state.
     contexts : pair of Context
         Of the trajectory, and for partial steps; the solver of steps need not be there.
-    steps : int
-        Address of the compiled steps.
     end : float
         The time up to which is looked.
 
@@ -134,20 +131,19 @@ class KernelSearch:
 
     def __init__(
         self, events: Mapping[str, Event], functions: Sequence[EventFunction], actions: Mapping[str, Action],
-        contexts: tuple[Context, Context], steps: int, end: float,
+        contexts: tuple[Context, Context], end: float,
     ):  # fmt: skip
         self._functions, self._actions = functions, actions
         self._context, _ = contexts
         self._dim, sign = self._context.shape.dim, 1.0 if end >= self._context.t0 else -1.0
-        self._memory = memory = search_memory(events, functions, actions, contexts, steps, end, sign)
+        self._memory = memory = search_memory(events, functions, actions, contexts, end, sign)
         self._hits = EventLog(events, memory.sign, self._dim, memory.parameters)
         self._make_room(room_for(max(self._dim, memory.parameters)))
         self.trouble: tuple[Status, str, Exception | None] | None = None
         if self._look(START) != DONE:
             error = self._error
             raise UserError(error) from error
-        self._context.point({"events.memory": self._memory.words})  # keeps it alive
-        self._context.events.code = look.code().address
+        self._context.events.code, self._context.events.memory = look.code(), memory
         self._context.events.act, self._context.events.acted = int(bool(actions)), -memory.sign * np.inf
 
     def _make_room(self, room: int) -> None:
@@ -155,7 +151,7 @@ class KernelSearch:
 
     def _look(self, mode: int) -> int:
         self._memory.mode = mode
-        outcome = look(self._context.address, self._memory.address)
+        outcome = look(self._context, self._memory)
         self._memory.mode = WHOLE
         return outcome
 
@@ -186,7 +182,7 @@ class KernelSearch:
 
     def _give_up(self, halted: int) -> None:
         """Look for nothing any more, and say why; the trajectory goes on."""
-        self._context.events.code = 0
+        self._context.events.code = None
         memory = self._memory
         known = f"are known up to t = {memory.known!r} only."
         if halted == RAISED:
@@ -261,7 +257,7 @@ class KernelSearch:
         self._hits.load(kept["hits"])
         self.trouble = kept["trouble"]
         if self.trouble is not None:
-            self._context.events.code = 0
+            self._context.events.code = None
 
     def work(self) -> dict[str, int]:
         """Return what the search has cost."""

@@ -3,11 +3,10 @@
 from llvmlite import ir
 from numba import types
 
-from integrators.kernel.context import DONE, Context
+from integrators.kernel.context import DONE, PART, Context
 from integrators.kernel.events.memory import CACHED
 from integrators.kernel.events.sample import NAN, function, noise_of, part_at, time_at
 from integrators.kernel.native.attributes import view
-from integrators.kernel.native.engine import PART
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.emit import INTEGER
 from integrators.kernel.simd.lanes import intrinsic
@@ -23,12 +22,12 @@ def call_entry(typing, steps, operation, own, partial, part, out):
     def generate(context, builder, sig, args):
         function, operation, own, partial, part, out = args
         none = ir.Constant(INTEGER, 0)
-        out = builder.ptrtoint(out, INTEGER)
+        part, out = (builder.ptrtoint(array, INTEGER) for array in (part, out))
         words = [operation, own, partial, none, none, none, none, part, none, out, none]
         kind = ir.FunctionType(INTEGER, [INTEGER] * len(words))
         return builder.call(builder.inttoptr(function, kind.as_pointer()), words)
 
-    return types.int64(*[types.int64] * 5, DOUBLES), generate
+    return types.int64(*[types.int64] * 4, DOUBLES, DOUBLES), generate
 
 
 @compiled
@@ -37,7 +36,7 @@ def forget_states(search):
     for i in range(CACHED):
         search.cache_times[i] = NAN
     search.cache_next = 0
-    search.part_known = 0.0
+    search.part[1] = 0.0
 
 
 @compiled
@@ -54,15 +53,15 @@ def state_at(ctx, search, t):
     state = search.cache_states + search.dim * i
     search.cache_next = (i + 1) % CACHED
     search.cache_times[i] = t
-    search.part = part_at(search, t)
+    search.part[0] = part_at(search, t)
     partial = context(search.partial)
-    outcome = call_entry(search.steps, PART, search.own, search.partial, search.asked, state)
+    outcome = call_entry(search.steps, PART, search.own, search.partial, search.part, state)
     # A partial step that only the implicit solver would solve is none: steps do not change.
     ctx.implicit.wanted = 0
     search.iterations += partial.counters.iterations
     search.evaluations += partial.counters.evaluations
     search.partial_steps += 1
-    search.part_known = search.part if outcome == DONE else 0.0
+    search.part[1] = search.part[0] if outcome == DONE else 0.0
     partial.counters.iterations = partial.counters.evaluations = partial.counters.restarts = 0
     if outcome != DONE:
         for d in range(search.dim):

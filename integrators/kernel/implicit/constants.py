@@ -6,6 +6,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from integrators.kernel.implicit.memory import BLENDED
 from integrators.kernel.native import binary, store
 from integrators.kernel.tables import Constants, constants
 
@@ -13,9 +14,6 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 MOST_EIGENVECTORS = 22  # degree up to which X_s has usable eigenvectors: their condition number is 1e12 there
-NEWTON, BLENDED = range(2)
-"""How corrections are computed."""
-
 LOW = 3
 
 
@@ -87,7 +85,7 @@ def _tables(k: int, s: int) -> tuple[Array, Array, Array, Array]:
     """Return integrals, the low parts of their first columns, the basis and X_s, kept on disk."""
     shapes = [(k, s), (k, min(LOW, s)), (k, s), (s, s)]
     ends = np.cumsum([rows * columns for rows, columns in shapes])
-    name = store.key("implicit", f"{k} {s}", binary.sources("implicit/constants", "../coefficients/legendre"))
+    name = store.key("implicit", f"{k} {s}", binary.sources(__name__))
     kept = store.get(name)
     if kept is None or len(kept) != 8 * ends[-1]:
         from integrators.coefficients import legendre  # 50 digits, which take their time to be imported

@@ -20,9 +20,9 @@ implicit methods for ODEs*, Applied Numerical Mathematics 42 (2002) 29-45.
 """
 
 from integrators.kernel.context import DIVERGED, DONE, NOT_FINITE
-from integrators.kernel.implicit.constants import BLENDED
 from integrators.kernel.implicit.jacobian import factorize, linearize, resolve
 from integrators.kernel.implicit.linear import eliminate
+from integrators.kernel.implicit.memory import BLENDED
 from integrators.kernel.implicit.stages import at, project, set_velocities
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.memory import get, put, splat8

@@ -1,12 +1,12 @@
 """The C function of the implicit solver."""
 
 from integrators.kernel.context import Context
+from integrators.kernel.implicit.memory import Corrections
 from integrators.kernel.implicit.newton import solve_step
-from integrators.kernel.implicit.workspace import Workspace
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
 
-context, workspace = view(Context), view(Workspace)
+context, workspace = view(Context), view(Corrections)
 
 
 @compiled

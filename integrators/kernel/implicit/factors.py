@@ -6,8 +6,6 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from integrators.kernel.native.raised import expect_callbacks
-
 Complex = NDArray[np.complex128]
 
 FACTORIZE, SOLVE = range(2)
@@ -43,9 +41,13 @@ class Factors:
     ----------
     address : int
         Of the C function ``int64(operation, group)`` that works on it.
+    calls_back : bool
+        True: it is a function of Python's.
     error : BaseException or None
         What went wrong last in a call, which compiled code takes for a failure.
     """
+
+    calls_back = True
 
     def __init__(self, arrays: Matrices, values: Complex):
         self._arrays, self._values = arrays, values
@@ -57,7 +59,6 @@ class Factors:
         self._dense = rows.size > DENSE * n * n
         if not self._dense:
             self._pattern = _Pattern(rows, columns, n)
-        expect_callbacks()
         self._callback = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)(self._called)
         self.address: int = ctypes.cast(self._callback, ctypes.c_void_p).value or 0
 

@@ -2,13 +2,13 @@
 
 from integrators.kernel.implicit.factors import FACTORIZE, SOLVE
 from integrators.kernel.implicit.linear import factor, solve
-from integrators.kernel.implicit.workspace import Workspace
+from integrators.kernel.implicit.memory import Corrections
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.lanes import fma
 from integrators.kernel.simd.memory import call_factors, call_field, get, put, splat8, spread
 
-workspace = view(Workspace)
+workspace = view(Corrections)
 STEP = 1.4901161193847656e-08  # sqrt(eps): where the errors of a difference balance
 SMALL = 1e-5  # of the largest component: no difference is taken over less
 POWERS = 6  # multiplications by the Jacobian that find its spectral radius to 20 % or so

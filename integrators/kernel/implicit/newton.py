@@ -1,9 +1,9 @@
 """A step by an implicit solver: which start, which Jacobian, when to stop, when to give up."""
 
 from integrators.kernel.context import BY_INCREMENT, DIVERGED, DONE, RUNNING, SCATTERED
-from integrators.kernel.implicit.constants import BLENDED, NEWTON
 from integrators.kernel.implicit.corrections import EACH, KEPT, correct, take_stage
 from integrators.kernel.implicit.jacobian import contraction, linearize
+from integrators.kernel.implicit.memory import BLENDED, NEWTON
 from integrators.kernel.implicit.stages import (
     FLOORED_WEIGHTS,
     WEIGHTS,

@@ -8,7 +8,7 @@ Coefficients lie as stages do: in groups of eight, a row for each component (`Wo
 p'; what is said of the field's coefficients is about the last block, what moves stages is the first.
 """
 
-from integrators.kernel.implicit.workspace import Workspace
+from integrators.kernel.implicit.memory import Corrections
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.lanes import fma
@@ -18,7 +18,7 @@ from integrators.kernel.step.fixed_point import multiply
 from integrators.kernel.step.size import change, enter_size, forget_sizes, invert_sizes, stage_size
 from integrators.kernel.step.stages import offset
 
-workspace = view(Workspace)
+workspace = view(Corrections)
 # Relative to a block, and relative to a block that is raised if it is small
 WEIGHTS, FLOORED_WEIGHTS = range(2)
 

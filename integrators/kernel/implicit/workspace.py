@@ -7,11 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from integrators.kernel.context import Shape
-from integrators.kernel.implicit.constants import BLENDED, NEWTON, method, solver_of
+from integrators.kernel.implicit.constants import method, solver_of
 from integrators.kernel.implicit.factors import Factors
-from integrators.kernel.native import binary, store
-from integrators.kernel.native import field as fields
-from integrators.kernel.native.memory import Array, Integer, Memory, Real, Table, aligned
+from integrators.kernel.implicit.memory import BLENDED, NEWTON, Corrections
+from integrators.kernel.native import binary, stages, store
+from integrators.kernel.native.field import BUILT_BY
+from integrators.kernel.native.memory import aligned
 from integrators.kernel.parts.implicit import ALWAYS_IMPLICIT, AUTO, FIXED_POINT
 from integrators.kernel.tables import packed
 from problems import emit
@@ -41,11 +42,6 @@ class Linearization:
     jacobian: Jacobian | None
     code: binary.Native | None
 
-    @property
-    def address(self) -> int:
-        """Of the code; 0 for differences."""
-        return 0 if self.code is None else self.code.address
-
     def entry_indices(self, rows: int) -> tuple[Integers, Integers]:
         """Return the rows and the columns of the entries; by differences they are all of them."""
         if self.jacobian is not None:
@@ -64,9 +60,9 @@ def linearization(system: System, *, second: bool) -> Linearization:
     except InputError:  # differences take the field alone
         return Linearization(None, None)
     text = emit.source(system, jacobian, "numba").text
-    name = store.key("jacobian", text, binary.sources(*fields.SOURCES))
+    name = store.key("jacobian", text, binary.sources(BUILT_BY))
     native = binary.obtain(
-        name, lambda: (fields.ONE_BY_ONE, fields.build_one_by_one(emit.numba(system, jacobian).py_func, 1))
+        name, lambda: (stages.ONE_BY_ONE, stages.build_one_by_one(emit.numba(system, jacobian).py_func, 1))
     )
     return Linearization(jacobian, native)
 
@@ -95,13 +91,8 @@ SOLVERS = {
 }
 
 
-class Workspace(Memory):
-    """The memory of a solver for the steps of one context: degree s, R rows, p pairs of eigenvalues of X_s.
-
-    There are R unknowns of each degree, and in the second-order form 2 R, in two blocks: the
-    coefficients of q' and then those of p'; see `integrators.kernel.implicit.stages`. Tables are packed as
-    in `integrators.kernel.tables`. The rows of tangent vectors along a trajectory are ``copies`` of its rows,
-    for which its Jacobian holds; the trajectory's stages follow theirs.
+class Workspace(Corrections):
+    """The memory of a solver for the steps of one context, as Python sees it.
 
     Parameters
     ----------
@@ -116,95 +107,6 @@ class Workspace(Memory):
     padded : int, optional
         `Context.padded`; by default it follows from the rows.
     """
-
-    method = Integer()  # how corrections are computed: NEWTON, BLENDED
-    source = Integer()  # address of the Jacobian, void(t, y, par, entries); 0 for differences
-    factors = Integer()  # address of what keeps the factors, int64(operation, pair); 0: they are here
-    rows = Integer()
-    copies = Integer()
-    unknowns = Integer()  # rows of a copy
-    first = Integer()  # row of the stages at which the Jacobian's state begins
-    trajectory = Integer()  # address of the solver's memory that the Jacobian is taken from; 0: of none
-    pulls = Integer()  # address of relative derivatives of velocities, by row; 0: none
-    padded = Integer()
-    k = Integer()
-    s = Integer()
-    dim = Integer()
-    parts = Integer()  # blocks of coefficients: 2 in the second-order form
-    groups = Integer()  # of eight coefficients
-    block = Integer()  # doubles in a block
-    pair_groups = Integer()  # of eight pairs of eigenvalues
-    wide = Integer()  # doubles that such a group's vectors take, in all groups
-    entry_count = Integer()
-    factored = Integer()  # 1: the factors are those of the entries and of `factored_h`
-    lu_size = Integer()
-    lu_rows = Integer()
-    whole = Integer()  # s R, rows of a matrix with a Jacobian for each stage; 0 if that is too large
-    whole_size = Integer()
-    trial_size = Integer()
-
-    # --- of the method ---
-    stage_table = Array()  # coefficients to stages, the low parts of its first columns before it
-    projection = Array()  # values -> coefficients
-    basis = Array()  # coefficients -> the polynomial at the nodes
-    weights = Array()  # of the stages in a mean, one per lane of stage memory
-    integrals = Table("k", "s")  # the stage table
-    force_integrals = Table("k", "s")  # the same; in the second-order form times X_s
-    moments = Table("s", "k")  # the projection
-    left = Array()  # rows of the inverse of the eigenvectors' matrix, eight real parts, eight imaginary ones
-    right = Array()  # eigenvectors, in the same way, twice where a conjugate belongs to them
-    eigen = Array()  # eigenvalues: eight real parts, eight imaginary ones
-    powers = Array()  # the same; in the second-order form their squares
-    x = Table("s", "s")  # X_s
-    derivatives = Array()  # X_s, packed
-    inverse = Array()  # rho X_s^{-1}, of blended iteration
-    radius = Real()  # part of X_s in a fixed-point iteration's contraction: its spectral radius, or squared
-
-    # --- the unknowns ---
-    gamma = Array("parts", "block")
-    increment = Table("dim")  # h gamma_0, what the step adds to the state
-    predicted = Array("parts", "block")
-    residual = Array("parts", "block")
-    correction = Array("parts", "block")
-    moving = Array("parts", "block", 2)  # coefficients in front of the stage table
-    factor = Table("rows")  # h, or h^2 q'/p in the second-order form
-    slope_weights = Table("rows")  # 1 / size of a row's block in h q', second-order form
-    floored_slope_weights = Table("rows")  # small blocks raised
-    predict = Integer()  # 1: the extrapolated start is nearer than the constant one
-    change = Real()  # of the last correction
-    rate = Real()  # by which corrections have contracted with this Jacobian; 1 where that is not known
-    contraction = Real()  # by which one fixed-point iteration contracts, an estimate ...
-    contraction_h = Real()  # ... of a step of this length
-
-    # --- the Jacobian and the factors ---
-    entry_rows = Table("entry_count", kind=int)
-    entry_columns = Table("entry_count", kind=int)
-    entries = Table("entry_count")
-    state = Table("unknowns")  # where the Jacobian is taken
-    lu = Array("lu_size")  # factors of eight matrices at a time; see `integrators.kernel.implicit.linear`
-    pivots = Array("lu_rows", kind=int)
-    begins = Array("lu_rows", kind=int)
-    ends = Array("lu_rows", kind=int)
-    whole_matrix = Array("whole_size")
-    whole_x = Array("whole")
-    linearized = Integer()  # 1: the entries are those at `state`
-    stale = Integer()  # 1: take a new Jacobian at the next step
-    since = Integer()  # steps since the Jacobian was taken
-    factored_h = Real()  # length of the step that the factors are for
-
-    # --- room ---
-    slopes = Table("unknowns")
-    next_slopes = Table("unknowns")
-    v = Array("parts", "wide")  # vectors of the first-order form, one for each pair
-    b = Array(16, "padded")  # right-hand sides and solutions of eight systems
-    trial = Array("trial_size")  # one block of stages, its times, and the field there
-
-    # --- counters ---
-    tried = Integer()
-    corrections = Integer()
-    jacobians = Integer()
-    factorizations = Integer()
-    full_newton = Integer()
 
     def __init__(
         self,
@@ -231,7 +133,7 @@ class Workspace(Memory):
         values[:pairs] = m.eigenvalues
         powers = values**2 if shape.second else values
         numbers = {
-            "method": solver_of(c.s, kind), "source": linearization.address, "rows": shape.rows,
+            "method": solver_of(c.s, kind), "rows": shape.rows,
             "copies": copies, "unknowns": unknowns, "padded": padded,
             "k": c.k, "s": c.s, "dim": shape.dim, "entry_count": rows.size,
             "parts": parts, "groups": groups, "block": 8 * groups * padded,
@@ -252,7 +154,8 @@ class Workspace(Memory):
             "x": m.x, "derivatives": packed(m.x), "inverse": packed(m.eigenvalues[0].real * m.inverse),
             "entry_rows": rows, "entry_columns": columns,
         }  # fmt: skip
-        super().__init__(numbers, {name: np.ascontiguousarray(array) for name, array in tables.items()})
+        arrays = {name: np.ascontiguousarray(array) for name, array in tables.items()}
+        super().__init__(numbers, arrays, {"source": linearization.code})
         self.kind, self.linearization = kind, linearization
         self.traced = linearization.jacobian is not None
         """Whether the Jacobian is traced, or taken by differences."""
@@ -262,9 +165,9 @@ class Workspace(Memory):
     def _find_factors(self) -> None:
         self.external_factors = None if self.lu_rows else Factors(self, self._values)
         """What keeps the factors, where they are not dense and small."""
-        self.factors = 0 if self.external_factors is None else self.external_factors.address
+        self.factors = self.external_factors
 
-    def along(self, shape: Shape, padded: int, pulls: int) -> "Workspace":
+    def along(self, shape: Shape, padded: int, pulls: NDArray[np.float64] | None) -> "Workspace":
         """Return memory for tangent vectors along the trajectory that this is the memory of.
 
         Parameters
@@ -273,11 +176,11 @@ class Workspace(Memory):
             Of the vectors' context.
         padded : int
             Of the same.
-        pulls : int
-            Address of relative derivatives of velocities, or 0.
+        pulls : ndarray or None
+            Relative derivatives of velocities, by row; ``None``: they are 0.
         """
         workspace = Workspace(shape, self.kind, self.linearization, shape.rows // self.rows, padded)
-        workspace.first, workspace.trajectory, workspace.pulls = shape.rows, self.address, pulls
+        workspace.first, workspace.trajectory, workspace.pulls = shape.rows, self, pulls
         return workspace
 
     def copy(self) -> Self:

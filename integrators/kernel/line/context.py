@@ -1,7 +1,7 @@
 """The memory of a trajectory along which a line integral is kept: a `Context` and what it needs besides."""
 
 from integrators.kernel.context import Context
-from integrators.kernel.native.memory import Array, Integer, Real, Table
+from integrators.kernel.native.memory import Array, Integer, Pointer, Real, Table
 
 # Whose line integrals vanish: those of several invariants, or that of a Poisson system's energy.
 INVARIANTS, POISSON = range(2)
@@ -17,7 +17,7 @@ class LineContext(Context):
     mode = Integer()  # INVARIANTS, POISSON
     invariants = Integer()  # how many
     every = Integer()  # rows that it writes
-    measure = Integer()  # address of what writes the gradients and then the invariants themselves
+    measure = Pointer()  # what writes the gradients and then the invariants themselves
     gradients = Array("calls", "every", "lanes")  # in the layout of stage memory
     remainders = Array("calls", "every", "lanes")  # what their first s coefficients leave of the rows
     legendre = Array("coefficient_groups", "every", 8)  # these coefficients

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from integrators.kernel.context import Context, Shape
+from integrators.kernel.engines import line
 from integrators.kernel.line.context import INVARIANTS, POISSON, LineContext
 from integrators.kernel.line.dependence import independent
-from integrators.kernel.line.engine import line
 from integrators.kernel.native.field import compile_field
 from integrators.kernel.tables import Constants, packed
 from integrators.protocol import Array
@@ -66,8 +66,6 @@ class Kept:
             "order": order, "ends": ends,
         }  # fmt: skip
         self._numbers = {
-            "line": self.code[0].address,
-            "measure": self.code[-1].address,
             "mode": INVARIANTS if n else POISSON,
             "invariants": n,
             "every": dim * n + max(dim, n) if n else dim * (1 + dim),
@@ -81,7 +79,8 @@ class Kept:
 
     def context(self, shape: Shape, tables: dict[str, Array]) -> LineContext:
         """Return fresh memory for a trajectory."""
-        return LineContext(shape, tables, self._numbers, self._tables)
+        pointers = {"line": self.code[0], "measure": self.code[-1]}
+        return LineContext(shape, tables, self._numbers, self._tables, pointers)
 
     def share(self, own: Context, partial: Context) -> None:
         """Let partial steps keep what the steps do."""

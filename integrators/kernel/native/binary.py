@@ -8,6 +8,7 @@ numba, which costs more than everything else it does before its first step.
 
 import hashlib
 import os
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -21,6 +22,10 @@ import llvmlite.binding as llvm
 
 from integrators.kernel.native import machine, store
 from integrators.kernel.native.machine import load, lock
+
+ROOT = Path(__file__).parents[3]
+IMPORT = re.compile(r"^[ ]*from ((?:integrators|problems)[\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
+TYPES_ONLY = re.compile(r"^if TYPE_CHECKING:.*\n(?:(?: .*)?\n)*", re.MULTILINE)
 
 _loaded: dict[str, "Native"] = {}
 _waited: list[float] = []  # seconds, for other processes
@@ -40,12 +45,18 @@ class Native:
         Whether it came from the store, or from this process's memory.
     seconds : float
         What compiling or loading it took.
+    calls_back : bool
+        Whether it calls Python back.
+    owner : object
+        What keeps it alive, where that is not this module.
     """
 
     address: int
     note: str
     from_cache: bool
     seconds: float
+    calls_back: bool = False
+    owner: Any = None
 
 
 @lru_cache(maxsize=1)
@@ -65,15 +76,35 @@ def platform() -> str:
     return "\n".join(parts)
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=64)
 def sources(*modules: str) -> str:
-    """Return the digest of modules and folders, by paths from the kernel: an edit voids their code."""
-    digest = hashlib.sha256()
-    for name in modules:
-        path = Path(__file__).parents[1] / name
-        for file in sorted(path.glob("*.py")) if path.is_dir() else [path.with_suffix(".py")]:
-            digest.update(file.read_bytes())
-    return digest.hexdigest()
+    """Return the digest of modules and of all that they import of these packages: an edit voids their code.
+
+    What numba compiles, it takes from there: functions, constants, the layout of memory. What is imported for
+    the checker of types alone does not count.
+    """
+    reached: dict[str, bytes] = {}
+    waiting = [*modules, __name__]  # this one turns functions into machine code
+    while waiting:
+        name = waiting.pop()
+        if name not in reached:
+            reached[name] = _file(name).read_bytes()
+            waiting += imported(reached[name].decode())
+    return hashlib.sha256(b"".join(reached[name] for name in sorted(reached))).hexdigest()
+
+
+def imported(text: str) -> set[str]:
+    """Return the modules of these packages that one imports, at its top or in its functions."""
+    found: set[str] = set()
+    for package, names in IMPORT.findall(TYPES_ONLY.sub("", text)):
+        parts = [part.split()[0] for part in re.sub(r"#.*", "", names).strip("()").split(",") if part.strip()]
+        found.update(name if _file(name := f"{package}.{part}").exists() else package for part in parts)
+    return {name for name in found if _file(name).exists()}
+
+
+def _file(module: str) -> Path:
+    path = ROOT.joinpath(*module.split("."))
+    return path.with_suffix(".py") if not path.is_dir() else path / "__init__.py"
 
 
 def obtain(name: str, make: Callable[[], tuple[str, bytes]]) -> Native:

@@ -4,15 +4,15 @@ import ctypes
 import sys
 from collections.abc import Callable
 from contextlib import suppress
-from functools import cached_property
+from functools import cached_property, partial
+from importlib import import_module
 from typing import Any
 
 from integrators.kernel.native import binary, lowered, store
-from integrators.kernel.native.raised import Interrupts, calls_back, raise_kept
+from integrators.kernel.native.memory import Memory
+from integrators.kernel.native.raised import Interrupts, raise_kept
 
-# What the entry of `step` can do; see `integrators.kernel.step.entry`.
-RESET, ADVANCE, TAKE, PART, GO_ON, ACT = range(6)
-ENTRY = "operation ctx partial between count times targets parts first out budget"
+KERNEL = "integrators.kernel"
 
 WAIT = "integrators: compiling the kernel for this processor, once: 2 to 10 s (ahead: `hbvm-bench warm`)"
 
@@ -28,16 +28,16 @@ class Engine:
 
     Parameters
     ----------
-    function : callable
-        Returns the numba function; called, and numba imported, only where it has to be compiled.
+    module : str
+        Of the kernel, where the function is.
+    function : str
+        Its name.
     arguments : str
         Names of the integers that it takes.
-    *sources : str
-        Folders and modules of the kernel whose code is in it: an edit of any makes another one.
     """
 
-    def __init__(self, function: Callable[[], Any], arguments: str, *sources: str):
-        self._make, self._arguments, self._sources = function, arguments.split(), sources
+    def __init__(self, module: str, function: str, arguments: str):
+        self._module, self._name, self._arguments = f"{KERNEL}.{module}", function, arguments.split()
 
     def code(self) -> binary.Native:
         """Return the machine code."""
@@ -58,13 +58,13 @@ class Engine:
     def _compiled(self) -> tuple[Any, list[tuple[Any, str]], str]:
         from numba import types
 
-        return self._make(), [(types.int64, "i64")] * len(self._arguments), "i64"
+        function = getattr(import_module(self._module), self._name)
+        return function, [(types.int64, "i64")] * len(self._arguments), "i64"
 
     @property
     def key(self) -> str:
         """What the machine code is kept by: the function, and the sources of all that is in it."""
-        make = self._make
-        return store.key("engine", make.__module__, make.__qualname__, binary.sources(*self._sources))
+        return store.key("engine", self._module, self._name, binary.sources(self._module))
 
     @cached_property
     def _function(self) -> Any:
@@ -72,17 +72,32 @@ class Engine:
         kinds = [ctypes.c_void_p] * len(self._arguments)
         return ctypes.CFUNCTYPE(ctypes.c_int64, *kinds)(self.code().address)
 
-    def __call__(self, *arguments: int, **named: int) -> int:
-        """Call it; missing arguments are 0. The interpreter's lock is released meanwhile.
+    def __call__(self, *arguments: int | Memory, **named: int | Memory) -> int:
+        """Call it with numbers, and with memories by their addresses; missing arguments are 0.
 
-        What a field in Python raised is raised here, as a `UserError`, and Ctrl-C as it is; the memory holds
-        what was made before.
+        The interpreter's lock is released meanwhile. What a field in Python raised is raised here, as a
+        `UserError`, and Ctrl-C as it is; the memory holds what was made before.
         """
+        return self.prepared(*arguments, **named)()
+
+    def prepared(self, *arguments: int | Memory, **named: int | Memory) -> Callable[[], int]:
+        """Return what calls it with these arguments, whose memories are kept by whoever asks."""
         if len(arguments) < len(self._arguments):
             arguments += tuple(named.get(name, 0) for name in self._arguments[len(arguments) :])
-        if not calls_back():
-            return self._function(*arguments)
-        with Interrupts():
-            outcome = self._function(*arguments)
-        raise_kept()
-        return outcome
+        words, calls_back = [], False
+        for argument in arguments:
+            if isinstance(argument, Memory):
+                words.append(argument.address)
+                calls_back = calls_back or argument.pointed.calls_back
+            else:
+                words.append(argument)
+        call = partial(self._function, *words)
+        return partial(_heard, call) if calls_back else call
+
+
+def _heard(call: Callable[[], int]) -> int:
+    """Return what a call returns that may call Python back; raise what is raised there."""
+    with Interrupts():
+        outcome = call()
+    raise_kept()
+    return outcome

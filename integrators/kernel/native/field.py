@@ -6,16 +6,14 @@ the stages. The user's code runs on all stages at once. Where numba cannot type
 it on lanes, it runs on one stage after another behind the same signature.
 """
 
-from typing import Any
+from collections.abc import Callable
 
-from integrators.kernel.native import binary, store
+from integrators.kernel.native import binary, stages, store
+from integrators.kernel.native.stages import ON_LANES
 from problems import emit
 from problems.systems.base import System
 
-ON_LANES, ONE_BY_ONE = "L", "S"
-Arguments = list[tuple[Any, str]]
-
-SOURCES = ("simd", "native")
+BUILT_BY = stages.__name__
 
 
 def compile_field(system: System, quantity: emit.Quantity, lanes: int) -> binary.Native:
@@ -36,24 +34,44 @@ def compile_field(system: System, quantity: emit.Quantity, lanes: int) -> binary
         Its note is `ON_LANES` or `ONE_BY_ONE`.
     """
     source = emit.source(system, quantity, "numba")
-    name = store.key("field", source.text, str(lanes), binary.sources(*SOURCES))
-    return binary.obtain(name, lambda: build(emit.numba(system, quantity).py_func, lanes))
+    name = store.key("field", source.text, str(lanes), binary.sources(BUILT_BY))
+    return binary.obtain(name, lambda: stages.build(emit.numba(system, quantity).py_func, lanes))
 
 
-def build(function: Any, lanes: int) -> tuple[str, bytes]:
-    """Compile ``function(t, y, par, out)`` on lanes if that is possible, else stage by stage.
+def compile_around(
+    system: System, quantity: emit.Quantity, lanes: int, module: str, form: object,
+    written: Callable[[str], str], *, par: bool = False,
+) -> binary.Native:  # fmt: skip
+    """Compile LLVM's text that is written around one of a system's functions on lanes, or load it.
+
+    Parameters
+    ----------
+    system, quantity
+        As for `compile_field`.
+    lanes : int
+        Stages, or trajectories, per call of the function.
+    module : str
+        Where ``written`` is from.
+    form : object
+        What else it depends on, as its ``repr`` tells.
+    written : callable
+        Given the name of the compiled function, returns the text of an `ENTRY` that calls it.
+    par : bool
+        Whether parameters differ from lane to lane.
 
     Raises
     ------
     numba.NumbaError
-        If it can be compiled neither way.
+        If the function cannot be compiled on lanes.
     """
-    from numba import NumbaError
+    source = emit.source(system, quantity, "numba")
+    name = store.key("around", source.text, str(lanes), repr(form), binary.sources(BUILT_BY, module))
 
-    try:
-        return ON_LANES, build_on_lanes(function, lanes)
-    except NumbaError:
-        return ONE_BY_ONE, build_one_by_one(function, lanes)
+    def make() -> tuple[str, bytes]:
+        function, arguments = stages.on_lanes(emit.numba(system, quantity).py_func, lanes, par=par)
+        return ON_LANES, binary.build(function, arguments, around=written)
+
+    return binary.obtain(name, make)
 
 
 def assembly(system: System, quantity: emit.Quantity, lanes: int) -> str:
@@ -64,53 +82,4 @@ def assembly(system: System, quantity: emit.Quantity, lanes: int) -> str:
     numba.NumbaError
         If it cannot be compiled.
     """
-    from numba import NumbaError
-
-    function = emit.numba(system, quantity).py_func
-    try:
-        return binary.assembly(*on_lanes(function, lanes))
-    except NumbaError:
-        return binary.assembly(*_one_by_one(function, lanes))
-
-
-def build_on_lanes(function: Any, lanes: int) -> bytes:
-    """Compile ``function(t, y, par, out)`` with t and y[i] as lanes."""
-    return binary.build(*on_lanes(function, lanes))
-
-
-def build_one_by_one(function: Any, lanes: int) -> bytes:
-    """Compile a loop over stages that calls ``function`` with scalars."""
-    return binary.build(*_one_by_one(function, lanes))
-
-
-def on_lanes(function: Any, lanes: int, *, par: bool = False) -> tuple[Any, Arguments]:
-    """Return ``function(t, y, par, out)`` for numba, and its arguments on lanes for `binary.build`.
-
-    Parameters are the same in all lanes, or with ``par`` rows like the stages.
-    """
-    from integrators.kernel.native.jit import compiled
-    from integrators.kernel.simd import functions  # noqa: F401 -- gives sin, exp, ... a meaning on lanes
-    from integrators.kernel.simd.lanes import Lanes
-    from integrators.kernel.simd.views import DOUBLES, Rows
-
-    stages = Rows(lanes)
-    arguments = [(Lanes(lanes), f"<{lanes} x double>"), (stages, "ptr"), (stages if par else DOUBLES, "ptr")]
-    return compiled(function), [*arguments, (stages, "ptr")]
-
-
-def _one_by_one(function: Any, lanes: int) -> tuple[Any, Arguments]:
-    from numba import types
-
-    from integrators.kernel.native.jit import compiled
-    from integrators.kernel.simd.views import strided
-
-    scalar = compiled(function)
-
-    def loop(t, stages, par, values):
-        for stage in range(lanes):
-            time = strided(t, 1)[stage]
-            scalar(
-                time, strided(stages + 8 * stage, lanes), strided(par, 1), strided(values + 8 * stage, lanes)
-            )
-
-    return compiled(loop), [(types.int64, "i64")] * 4
+    return stages.assembly(emit.numba(system, quantity).py_func, lanes)

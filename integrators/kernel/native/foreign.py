@@ -13,13 +13,14 @@ from weakref import WeakKeyDictionary, ref
 import numpy as np
 
 from integrators.kernel.native import binary, raised
-from integrators.kernel.native.field import ONE_BY_ONE, compile_field
+from integrators.kernel.native.field import compile_field
+from integrators.kernel.native.stages import ONE_BY_ONE
 from problems import emit
 from problems.systems.base import System
 from problems.systems.untraced import Foreign
 
 _functions: WeakKeyDictionary[Foreign, dict[int, tuple[int, Any]]] = WeakKeyDictionary()
-"""The address of each field by lanes, and what keeps it alive: as long as its system is there."""
+"""The address of each field by lanes, and the function that it is of: as long as its system is there."""
 
 
 def field_of(system: System, quantity: emit.Quantity, lanes: int) -> binary.Native:
@@ -40,12 +41,13 @@ def field_of(system: System, quantity: emit.Quantity, lanes: int) -> binary.Nati
         known = lanes in compiled
         if not known:
             compiled[lanes] = (_compiled if system.numba else _called)(system, lanes)
-        address, _ = compiled[lanes]
-    return binary.Native(address, ONE_BY_ONE, known, perf_counter() - started)
+        address, function = compiled[lanes]
+    seconds = perf_counter() - started
+    return binary.Native(address, ONE_BY_ONE, known, seconds, not system.numba, (system, function))
 
 
 def _compiled(system: Foreign, lanes: int) -> tuple[int, Any]:
-    """Return the address of a numba field on stage memory, and what keeps it alive."""
+    """Return the address of a numba field on stage memory, and the function."""
     import numba
     from numba import types
 
@@ -111,7 +113,7 @@ def _compiled(system: Foreign, lanes: int) -> tuple[int, Any]:
 
 
 def _called(system: Foreign, lanes: int) -> tuple[int, Any]:
-    """Return the address of a callback to a Python field, and what keeps it alive."""
+    """Return the address of a callback to a Python field, and the callback."""
     dim, size = system.dim, system.n_par
     owner = ref(system)  # which holds this callback, not the other way round
     line, block, numbers = (ctypes.c_double * n for n in (lanes, dim * lanes, size))
@@ -131,7 +133,7 @@ def _called(system: Foreign, lanes: int) -> tuple[int, Any]:
             derivatives = np.empty((lanes, dim))
             previous: tuple[Any, ...] = ()
             evaluated = owner()
-            assert evaluated is not None  # who steps holds its system
+            assert evaluated is not None  # which the `Native` of this callback holds
             with np.errstate(all="ignore"):
                 for time, state, derivative in zip(times, states, derivatives, strict=True):
                     if previous and time == previous[0] and (state == previous[1]).all():
@@ -143,7 +145,6 @@ def _called(system: Foreign, lanes: int) -> tuple[int, Any]:
         except BaseException as error:  # also Ctrl-C: nothing passes through compiled code
             raised.keep(error)
 
-    raised.expect_callbacks()
     kind: Callable[..., Any] = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 4)
     function: Any = kind(field)
     address = ctypes.cast(function, ctypes.c_void_p).value

@@ -15,16 +15,21 @@ makes them attributes of its address:
     def drift(orbit):                   # machine code: two loads at constant places
         return orbit.h * orbit.state[0]
 
+The addresses of other things are no numbers that somebody has to keep valid: an `Array` that is pointed to, a
+`Pointer` and `Pointers` are set to the things themselves, which then live as long as the memory does.
+
 Slots of one idea make a `Part`, which a memory has among its own as ``solver = Within(Solver)``:
 ``orbit.solver.rate`` is a number at a constant place too, and what is called with ``orbit.solver`` reads
 nothing else.
 """
 
 import ctypes
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import prod
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar, overload
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Protocol, Self, TypeVar, overload
+from weakref import ref
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +37,7 @@ from numpy.typing import NDArray
 Numbers = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-Content = tuple[Numbers, dict[int, NDArray[Any]]]
+Content = tuple[Numbers, dict[int, Any]]
 
 LINE = 8  # words in 64 bytes, at a multiple of which every array begins
 
@@ -54,6 +59,45 @@ def address(array: Any) -> int:
         return ctypes.addressof(ctypes.c_char.from_buffer(array))
     except (TypeError, ValueError, BufferError):  # it is read-only, empty or has gaps
         return array.ctypes.data
+
+
+class Addressed(Protocol):
+    """What compiled code finds by an address: a `Memory`, machine code, a function that it calls back."""
+
+    @property
+    def address(self) -> int: ...
+
+
+def address_of(owner: "Addressed | NDArray[Any] | None") -> int:
+    """Return the address that a slot holds of something; 0 of ``None``."""
+    if owner is None:
+        return 0
+    return address(owner) if isinstance(owner, np.ndarray) else owner.address
+
+
+class Pointed(dict[int, Any]):
+    """What a memory points to, by the word that holds its address: it lives as long as the memory."""
+
+    changed = True
+    """Whether the memory points elsewhere than when `Memory.content` was called."""
+    calls_back = False
+    """Whether any of it calls Python back; it is complete when it is pointed to."""
+
+    def hold(self, word: int, owner: Any) -> None:
+        """Keep what a word holds the address of, instead of what was there before."""
+        before, self[word], self.changed = self.get(word), owner, True
+        if self.calls_back or getattr(owner, "calls_back", False) or getattr(before, "calls_back", False):
+            self._find_callers()
+
+    def become(self, other: Mapping[int, Any]) -> None:
+        """Hold what another holds."""
+        self.clear()
+        self.update(other)
+        self.changed = True
+        self._find_callers()
+
+    def _find_callers(self) -> None:
+        self.calls_back = any(getattr(owner, "calls_back", False) for owner in self.values())
 
 
 class Slot:
@@ -82,7 +126,7 @@ class Number(Slot, property):
 
 
 class Integer(Number):
-    """A whole number, or the address of a function."""
+    """A whole number."""
 
     kind = ctypes.c_int64
 
@@ -121,6 +165,31 @@ class Real(Number):
         memory.reals[self.index] = value
 
 
+class Pointer(Integer):
+    """The address of something, which lives as long as the memory.
+
+    It is set to the thing itself, or to ``None``; read, here and in compiled code, it is the address or 0.
+    """
+
+    if TYPE_CHECKING:
+
+        def __set__(  # type: ignore[override]
+            self, memory: "_Slots", value: Addressed | NDArray[Any] | None
+        ) -> None: ...
+
+    def _write(self, memory: "_Slots", value: Any) -> None:
+        memory.words[self.index] = address_of(value)
+        memory.pointed.hold(memory._first + self.index, value)
+
+
+class Backward(Pointer):
+    """The address of the memory that holds this one and outlives it: to hold it too would make a circle."""
+
+    def _write(self, memory: "_Slots", value: Any) -> None:
+        memory.words[self.index] = value.address
+        memory.pointed.hold(memory._first + self.index, ref(value))
+
+
 class Array(Slot):
     r"""The address of an array.
 
@@ -145,12 +214,51 @@ class Array(Slot):
     def __get__(self, memory: "_Slots | None", owner: type) -> Any:
         if memory is None:
             return self
-        if (pointed := memory._pointed.get(memory._first + self.index)) is not None:
+        if (pointed := memory.pointed.get(memory._first + self.index)) is not None:
             return pointed
         # Compiled code may have exchanged it for another.
         start = memory._first + (int(memory.words[self.index]) - memory.address) // 8
         words = memory._memory[start : memory._ends[start]]
         return words if self.dtype is float else words.view(np.int64)
+
+
+class Pointers(Array):
+    """The address of an array of addresses of things, all of which live as long as the memory.
+
+    It is set to a sequence of the things themselves, in which ``None`` has the address 0.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(kind=int)
+
+    if TYPE_CHECKING:
+
+        @overload
+        def __get__(self, memory: None, owner: type) -> Self: ...
+        @overload
+        def __get__(self, memory: "_Slots", owner: type) -> "Sequence[Addressed | NDArray[Any] | None]": ...
+        def __get__(self, memory: "_Slots | None", owner: type) -> Any: ...
+
+    def __set__(self, memory: "_Slots", value: "Sequence[Addressed | NDArray[Any] | None]") -> None:
+        addresses = np.array([address_of(each) for each in value], dtype=np.int64)
+        memory.words[self.index] = address(addresses)
+        memory.pointed.hold(memory._first + self.index, Several(tuple(value), addresses))
+
+
+class Several(tuple[Any, ...]):
+    """Things that a memory points to by one array of their addresses."""
+
+    addresses: Integers
+
+    def __new__(cls, things: tuple[Any, ...], addresses: Integers) -> Self:
+        self = super().__new__(cls, things)
+        self.addresses = addresses
+        return self
+
+    @property
+    def calls_back(self) -> bool:
+        """Whether any of them calls Python back; see `Memory.calls_back`."""
+        return any(getattr(thing, "calls_back", False) for thing in self)
 
 
 class Table(Array):
@@ -193,7 +301,7 @@ class _Slots:
     _structure: ClassVar[Any]
 
     _first = 0  # which word of the memory is the first of these
-    _pointed: dict[int, NDArray[Any]]  # arrays that are pointed to, by the word in the memory
+    pointed: Pointed  # what it points to, and keeps alive
     _memory: Numbers
     _ends: dict[int, int]
     address: int
@@ -231,7 +339,7 @@ class Part(_Slots):
         self.words, self.reals = memory.words[within.index : end], memory.reals[within.index : end]
         self.numbers = getattr(memory.numbers, within.name)
         self.address = memory.address + 8 * within.index
-        self._memory, self._ends, self._pointed = memory._memory, memory._ends, memory._pointed
+        self._memory, self._ends, self.pointed = memory._memory, memory._ends, memory.pointed
 
 
 class Memory(_Slots):
@@ -245,6 +353,8 @@ class Memory(_Slots):
         What slots begin with; the shapes of arrays follow from it. The others are 0.
     arrays : mapping of str to ndarray
         Arrays to point to, by their slots' names; not copied.
+    pointers : mapping of str to Addressed or None, optional
+        What `Pointer` slots point to, by their names.
 
     Attributes
     ----------
@@ -256,8 +366,6 @@ class Memory(_Slots):
         For compiled functions.
     """
 
-    repointed: bool = True
-    """Whether it points elsewhere than when `content` was called."""
     word_of: ClassVar[dict[str, int]] = {}
     """The word of each slot, those of parts too."""
     _all: ClassVar[dict[str, Slot]] = {}
@@ -270,7 +378,10 @@ class Memory(_Slots):
                 cls._all[f"{part.name}.{name}"] = slot
                 cls.word_of[f"{part.name}.{name}"] = part.index + slot.index
 
-    def __init__(self, numbers: Mapping[str, float], arrays: Mapping[str, NDArray[Any]]):
+    def __init__(
+        self, numbers: Mapping[str, float], arrays: Mapping[str, NDArray[Any]],
+        pointers: "Mapping[str, Addressed | None]" = MappingProxyType({}),
+    ):  # fmt: skip
         def size(n: int | str, part: str) -> int:
             if isinstance(n, int):
                 return n
@@ -291,8 +402,11 @@ class Memory(_Slots):
         for name, value in numbers.items():
             (self.reals if isinstance(self._all[name], Real) else self.words)[self.word_of[name]] = value
         self._find_indices()
-        self._pointed = {}
+        self.pointed = Pointed()
         self.point(arrays)
+        for name, owner in pointers.items():
+            self.pointed.hold(self.word_of[name], owner)
+            self.words[self.word_of[name]] = address_of(owner)
 
     def _lies_in(self, memory: Numbers) -> None:
         self._memory = memory
@@ -300,6 +414,16 @@ class Memory(_Slots):
         self.words = self.reals.view(np.int64)
         self.numbers = self._structure.from_buffer(memory)
         self.address = ctypes.addressof(self.numbers)
+
+    @property
+    def calls_back(self) -> bool:
+        """Whether compiled code that is called with it may call Python back: something it points to does."""
+        return self.pointed.calls_back
+
+    @property
+    def repointed(self) -> bool:
+        """Whether it points elsewhere than when `content` was called."""
+        return self.pointed.changed
 
     @property
     def nbytes(self) -> int:
@@ -312,7 +436,7 @@ class Memory(_Slots):
         vars(other).update(vars(self))
         for part in self.part_of:  # which are this one's
             vars(other).pop(part, None)
-        other._pointed = {}
+        other.pointed = Pointed()
         other._lies_in(_from_a_line_on(np.empty(self._memory.size + LINE)))
         other.become(self)
         return other
@@ -322,30 +446,25 @@ class Memory(_Slots):
         self._memory[:] = other._memory
         self._own, self._indices = other._own, other._indices
         self.words[self._indices] += self.address - other.address
-        self._point_as(other._pointed)
+        self.pointed.become(other.pointed)
 
     def content(self) -> "Content":
         """Return a copy of all that it holds, for `renew`."""
-        self.repointed = False
-        return self._memory.copy(), self._pointed.copy()
+        self.pointed.changed = False
+        return self._memory.copy(), dict(self.pointed)
 
     def renew(self, content: "Content") -> None:
         """Take back what `content` returned."""
         self._memory[:], pointed = content
-        if self.repointed:
-            self._point_as(pointed)
-            self.repointed = False
-
-    def _point_as(self, pointed: Mapping[int, NDArray[Any]]) -> None:
-        self._pointed.clear()
-        self._pointed.update(pointed)
+        if self.pointed.changed:
+            self.pointed.become(pointed)
+            self.pointed.changed = False
 
     def point(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Let slots point to arrays, and keep these alive."""
-        self.repointed = True
         for name, array in arrays.items():
             index = self.word_of[name]
-            self._pointed[index] = array
+            self.pointed.hold(index, array)
             self.words[index] = address(array)
         if not self._own.keys().isdisjoint(arrays):
             self._own = {name: part for name, part in self._own.items() if name not in arrays}

@@ -20,7 +20,6 @@ class _Raised(threading.local):
 
 
 _raised = _Raised()
-_calls_back = False
 
 
 def keep(error: BaseException) -> None:
@@ -46,17 +45,6 @@ def raise_kept() -> None:
         raise UserError(error) from error
     if error is not None:
         raise error
-
-
-def expect_callbacks() -> None:
-    """Say that compiled code of this process calls Python back: from now on Ctrl-C is kept meanwhile."""
-    global _calls_back
-    _calls_back = True
-
-
-def calls_back() -> bool:
-    """Whether compiled code of this process may call Python back."""
-    return _calls_back
 
 
 class Interrupts:

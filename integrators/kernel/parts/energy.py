@@ -1,14 +1,14 @@
 """The projection onto the energy."""
 
-from integrators.kernel.native.memory import Array, Integer, Part, Real
+from integrators.kernel.native.memory import Array, Integer, Part, Pointer, Real
 
 
 class Energy(Part):
     """The energy that steps end with; see `step.projection`."""
 
-    # address of what writes the gradient of the energy and then the energy itself, called like the field with
+    # What writes the gradient of the energy and then the energy itself, called like the field with
     # eight stages; 0: no projection
-    code = Integer()
+    code = Pointer()
     start = Real()  # the energy of the start, which steps end with,
     scale = Real()  # and the inverse of how much of it the components make there
     rows = Integer()  # of what it writes: one more than the state has; 0: no projection

@@ -1,6 +1,6 @@
 """What a step knows of events."""
 
-from integrators.kernel.native.memory import Integer, Part, Real
+from integrators.kernel.native.memory import Integer, Part, Pointer, Real
 
 # What the search for events is asked for at the end of a step that such an event ends: to CHANGE the state,
 # and to BEGIN_ANEW from there.
@@ -10,8 +10,8 @@ CHANGE, BEGIN_ANEW = 1, 2
 class Events(Part):
     """The search for events in each step, and the event that ends it; see `step.act`."""
 
-    code = Integer()  # address of int64(context, memory), which looks for events in each step; 0: none
-    memory = Integer()
+    code = Pointer()  # int64(context, memory), which looks for events in each step; 0: none
+    memory = Pointer()
     act = Integer()  # 1: some of these change the state; then steps end there
     seen = Integer()  # 1: the solved step has been looked at
     acting = Integer()  # what an event that ends the solved step asks for: CHANGE, BEGIN_ANEW; 0: none does

@@ -1,6 +1,6 @@
 """The implicit solver, and when it takes over from the fixed-point iteration."""
 
-from integrators.kernel.native.memory import Array, Integer, Part, Real
+from integrators.kernel.native.memory import Array, Integer, Part, Pointer, Real
 
 # Which nonlinear solver is used. AUTO: fixed point, and the implicit solver where that does not contract.
 FIXED_POINT, AUTO, ALWAYS_IMPLICIT = range(3)
@@ -11,8 +11,8 @@ class Implicit(Part):
     """The implicit solver beside the fixed-point iteration; see `step.solver_switch`."""
 
     strategy = Integer()  # FIXED_POINT, AUTO, ALWAYS_IMPLICIT
-    code = Integer()  # address of int64(context, memory, started); 0: not there yet
-    memory = Integer()
+    code = Pointer()  # int64(context, memory, started); 0: not there yet
+    memory = Pointer()
     active = Integer()  # 1: it is at work
     wanted = Integer()  # it should be, and is not there: FOR_STEPS, or only FOR_VECTORS that follow
     slow = Integer()  # steps in a row at which the fixed-point iteration was slow

@@ -1,12 +1,12 @@
 """Reversible steps."""
 
-from integrators.kernel.native.memory import Array, Integer, Part, Real
+from integrators.kernel.native.memory import Array, Integer, Part, Pointer, Real
 
 
 class Pace(Part):
     """Reversible steps, of length `epsilon` / density; see `step.reversible`."""
 
-    code = Integer()  # address of `problems.emit.time_scale`, called like the field; 0: no such steps
+    code = Pointer()  # `problems.emit.time_scale`, called like the field; 0: no such steps
     rows = Integer()
     parameters = Integer()
     par = Array("parameters")

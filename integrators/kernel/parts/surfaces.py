@@ -1,9 +1,9 @@
 """Surfaces at which the field switches."""
 
-from integrators.kernel.native.memory import Array, Integer, Part, Real
-from problems.analysis.sides import MOST
+from integrators.kernel.native.memory import Array, Integer, Part, Pointer, Real
 
-MOST_SIDES = 1 + MOST  # rows of what tells the sides of switching surfaces
+MOST_SURFACES = 16  # whose distances have a row of their own
+MOST_SIDES = 1 + MOST_SURFACES  # rows of what tells the sides of switching surfaces
 
 # Where a solved step crosses a switching surface, besides at a node: after the last one; nowhere.
 END_ACROSS, NO_SURFACE = -1, -2
@@ -15,7 +15,7 @@ AT_STEP_END, AT_ORIGIN = 1, 2
 class Surfaces(Part):
     """Switching surfaces, and the steps that end on them; see `step.surfaces`."""
 
-    code = Integer()  # address of `problems.analysis.sides`, called like the field; 0: no such surfaces
+    code = Pointer()  # `problems.analysis.sides`, called like the field; 0: no such surfaces
     count = Integer()  # how many distances it has besides: rows after the first
     values = Array("calls", MOST_SIDES, "lanes")  # its values at the stages,
     ends = Array(MOST_SIDES, "lanes")  # at the start, then at the end of the step,

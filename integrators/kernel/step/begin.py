@@ -7,6 +7,7 @@ formed; the state is a compensated pair whose error enters the stages.
 
 from integrators.kernel.context import RUNNING
 from integrators.kernel.native.jit import compiled, for_both_widths
+from integrators.kernel.routes import PER_OCTAVE, THROUGH
 from integrators.kernel.simd.lanes import fma
 from integrators.kernel.simd.memory import get, put, put_lower, put_upper, splat8, spread
 from integrators.kernel.simd.operations import binary_log
@@ -22,7 +23,6 @@ from integrators.kernel.step.rule import FARTHEST
 from integrators.kernel.step.size import take_sizes
 from integrators.kernel.step.stages import offset
 from integrators.kernel.step.sums import multiplied, part_of_drift, time_of_step
-from integrators.kernel.tables import PER_OCTAVE, THROUGH
 
 INFINITY = float("inf")
 

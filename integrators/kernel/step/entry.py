@@ -1,7 +1,6 @@
 """What Python calls: the one C function of the steps."""
 
-from integrators.kernel.context import DONE
-from integrators.kernel.native.engine import ACT, ADVANCE, GO_ON, PART, RESET
+from integrators.kernel.context import ACT, ADVANCE, DONE, GO_ON, PART, RESET
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.views import doubles, integers
 from integrators.kernel.step.act import end_and_change, go_on

@@ -8,6 +8,7 @@ of A stay in registers while the rows pass by.
 
 from integrators.kernel.context import EVALUATE, MEASURE, VALUES
 from integrators.kernel.native.jit import compiled
+from integrators.kernel.routes import WIDE
 from integrators.kernel.simd.lanes import fma
 from integrators.kernel.simd.memory import (
     call_field,
@@ -22,7 +23,6 @@ from integrators.kernel.simd.memory import (
 )
 from integrators.kernel.step.size import change
 from integrators.kernel.step.stages import group_offset, offset
-from integrators.kernel.tables import WIDE
 
 INFINITY = float("inf")
 

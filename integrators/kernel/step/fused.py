@@ -13,7 +13,7 @@ from typing import Any
 from llvmlite import ir
 
 from integrators.kernel.context import EVALUATE, Context
-from integrators.kernel.native import binary, field, machine, store
+from integrators.kernel.native import machine
 from integrators.kernel.simd.emit import (
     ALIGNMENT,
     DOUBLE,
@@ -28,18 +28,15 @@ from integrators.kernel.simd.emit import (
     text_of,
     vector,
 )
-from problems import emit
-from problems.systems.base import System
 
 ITERATIONS = ir.FunctionType(ir.VoidType(), [INTEGER] * 3)
-
 
 ROWS = 4
 """Components of a stage up to which whole iterations are compiled with the field."""
 
 
-def compile_iterations(system: System, quantity: emit.Quantity, lanes: int, rows: int) -> binary.Native:
-    """Compile ``void(context, count, after)``, or load it: for a field on lanes, and factors in the matrix.
+def iterations(inner: str, lanes: int, rows: int, by_columns: bool) -> str:
+    """Return LLVM's text of ``void(context, count, after)`` around a compiled field, factors in the matrix.
 
     It does ``count`` iterations. With ``after`` = `MEASURE`, for one iteration or more, `Scratch.old_stages`
     then holds the stages before the last one, and `Solver.change` the largest change relative to the size of
@@ -47,30 +44,15 @@ def compile_iterations(system: System, quantity: emit.Quantity, lanes: int, rows
 
     Parameters
     ----------
-    system, quantity, lanes
-        As for `field.compile_field`; ``lanes`` are all stages.
+    inner : str
+        Name of the field, on lanes.
+    lanes : int
+        All stages.
     rows : int
         Components of a stage.
-    """
-    source = emit.source(system, quantity, "numba")
-    modules = binary.sources(*field.SOURCES, "parts", "context", "step/fused")
-    by_columns = lanes == WIDTH or machine.many_registers()
-    name = store.key("iterations", source.text, str(lanes), str(rows), str(by_columns), modules)
-
-    def make() -> tuple[str, bytes]:
-        function, arguments = field.on_lanes(emit.numba(system, quantity).py_func, lanes)
-        return field.ON_LANES, binary.build(
-            function, arguments, around=lambda inner: iterations(inner, lanes, rows, by_columns)
-        )
-
-    return binary.obtain(name, make)
-
-
-def iterations(inner: str, lanes: int, rows: int, by_columns: bool) -> str:
-    """Return LLVM's text of what `compile_iterations` promises, around the compiled field ``inner``.
-
-    ``by_columns``: products go through the matrix once, with the sums of all rows in registers; else eight
-    stages of a row after another, with their values in memory.
+    by_columns : bool
+        Whether products go through the matrix once, with the sums of all rows in registers; else eight
+        stages of a row after another, with their values in memory.
     """
     module = ir.Module()
     pointer = DOUBLE.as_pointer()

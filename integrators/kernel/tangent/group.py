@@ -136,7 +136,7 @@ class Group:
         halves = 2 if not shape.second and system.dof is not None else 1
         block = np.arange(rows) // (shape.rows // halves)
         wider = Shape(
-            rows, shape.second, shape.unit, field.address, 0,
+            rows, shape.second, shape.unit, field, None,
             system.n_par * (1 + n if self._moves else 1), block, np.arange(halves * n), c,
         )  # fmt: skip
         padded = -(-rows // 8) * 8 + -(-shape.rows // 8) * 8

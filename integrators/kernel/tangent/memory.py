@@ -1,6 +1,6 @@
 """What tangent vectors keep in memory besides their contexts; see `integrators.kernel.native.memory`."""
 
-from integrators.kernel.native.memory import Array, Integer, Memory
+from integrators.kernel.native.memory import Array, Backward, Integer, Memory, Pointers
 
 
 class Tangents(Memory):
@@ -10,14 +10,14 @@ class Tangents(Memory):
     after another, are the rows of their context.
     """
 
-    trajectory = Integer()  # address of its context
+    trajectory = Backward()  # its context
     dim = Integer()  # of the trajectory's state
     rows = Integer()  # components of one of its stages
     count = Integer()  # vectors
     groups = Integer()
-    own = Array("groups", kind=int)  # addresses of the groups' contexts,
-    partial = Array("groups", kind=int)  # of those for partial steps,
-    pulls = Array("groups", kind=int)  # and of the relative derivatives of velocities, by row; 0: none
+    own = Pointers()  # the groups' contexts,
+    partial = Pointers()  # those for partial steps,
+    pulls = Pointers()  # and the relative derivatives of velocities, by row; 0: none
     vectors = Array("groups", kind=int)  # in each group
     room = Array("room_size")  # for the state of a group
     room_size = Integer()

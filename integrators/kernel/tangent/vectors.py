@@ -6,9 +6,8 @@ from typing import Any
 import numpy as np
 
 from integrators.kernel.context import Context
-from integrators.kernel.implicit import engine as implicit_engine
+from integrators.kernel.engines import follow, solver
 from integrators.kernel.implicit.workspace import Workspace
-from integrators.kernel.tangent.engine import follow
 from integrators.kernel.tangent.group import Directions, Group, function_of
 from integrators.kernel.tangent.memory import Tangents
 from integrators.protocol import Array
@@ -54,18 +53,18 @@ class Vectors:
         self._groups = [Group(system, contexts, part.stop - part.start, moves, fresh) for part in self._parts]
         self._memory = memory = Tangents(
             {
-                "trajectory": self._context.address, "dim": dim, "rows": self._context.shape.rows,
+                "dim": dim, "rows": self._context.shape.rows,
                 "count": count, "groups": len(ends), "room_size": dim * ends[0],
             },
             {},
         )  # fmt: skip
-        memory.own[:] = [group.own.address for group in self._groups]
-        memory.partial[:] = [group.partial.address for group in self._groups]
+        memory.trajectory = self._context
+        memory.own = [group.own for group in self._groups]
+        memory.partial = [group.partial for group in self._groups]
         memory.vectors[:] = [group.count for group in self._groups]
         self.nbytes = sum(group.nbytes for group in self._groups)
-        self._code, self._out = follow.code().address, np.empty((0, *self.shape))
+        self._code, self._out = follow.code(), np.empty((0, *self.shape))
         self._known: dict[float, Array] = {}
-        self._pulls = memory.pulls
 
     def begin(self, directions: Directions) -> None:
         """Follow the trajectory whose memory the contexts have now, from its present state on."""
@@ -80,22 +79,17 @@ class Vectors:
         else:
             for group, part in zip(self._groups, self._parts, strict=True):
                 group.begin(directions.some(part))
-        for i, group in enumerate(self._groups):
-            self._pulls[i] = 0 if group.pulls is None else group.pulls.ctypes.data
+        self._memory.pulls = [group.pulls for group in self._groups]
         self._memory.failed = 0
-        self._context.follow_memory = self._memory.address  # its stepper refers to the vectors
-        self._context.follow = self._code
+        self._context.follow, self._context.follow_memory = self._code, self._memory
 
     def solve_by(self, solvers: tuple[Workspace, Workspace]) -> None:
         """Give the vectors the implicit solver of the trajectory and that of its partial steps."""
-        self._solver = solvers[0]
-        for group, pulls in zip(self._groups, self._pulls.tolist(), strict=True):
-            for context, solver in zip((group.own, group.partial), solvers, strict=True):
-                workspace = solver.along(context.shape, context.padded, pulls)
-                context.implicit.code, context.implicit.memory = (
-                    implicit_engine.solver.code().address,
-                    workspace.address,
-                )
+        self._solver, code = solvers[0], solver.code()
+        for group in self._groups:
+            for context, own in zip((group.own, group.partial), solvers, strict=True):
+                workspace = own.along(context.shape, context.padded, group.pulls)
+                context.implicit.code, context.implicit.memory = code, workspace
                 context.point({"implicit.increment": workspace.increment})
                 self.solvers.append(workspace)
 
@@ -165,8 +159,8 @@ class Vectors:
             own.set_factors(own.h)
             for array, kept in zip(_arrays(own), arrays, strict=True):
                 array[:] = kept
-        for solver, kept in zip(self.solvers, solvers, strict=bool(solvers)):
-            solver.restore(kept)
+        for own, kept in zip(self.solvers, solvers, strict=bool(solvers)):
+            own.restore(kept)
 
     def note(self, times: Array) -> None:
         """Keep the vectors of the samples that have been made, by their times."""

@@ -131,9 +131,10 @@ def install(simulation: Any, method: HBVM | Gauss) -> None:
 def _table(k: int, s: int) -> int:
     """Return the address of the tables of HBVM(k, s), or 0 if there is no such method."""
     try:
-        if (k, s) not in _tables:
-            _tables[k, s] = _make_table(k, s)
-        return _tables[k, s].ctypes.data
+        table = _tables.get((k, s))
+        if table is None:  # of two threads that make it, both go on with the one that is kept
+            table = _tables.setdefault((k, s), _make_table(k, s))
+        return table.ctypes.data
     except InputError:
         return 0
 
@@ -222,8 +223,7 @@ def _native(callback: str) -> int:
 
         return " ", step.build(callback)
 
-    plugin = ("rule", "rebound/layout", "rebound/memory", "rebound/step")
-    files = native.sources("step/rule", *(f"../plugins/{part}" for part in plugin))
+    files = native.sources("integrators.plugins.rebound.step")
     return native.obtain(store.key("rebound", callback, files, layout.IDENTITY), make).address
 
 

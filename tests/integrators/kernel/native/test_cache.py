@@ -10,8 +10,8 @@ import textwrap
 import pytest
 
 from integrators.kernel import tables
+from integrators.kernel.engines import steps
 from integrators.kernel.native import binary, store
-from integrators.kernel.step.engine import steps
 
 # A system of its own for each constant; prints whether numba was needed, and a result.
 SCRIPT = textwrap.dedent(

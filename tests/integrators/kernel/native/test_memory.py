@@ -1,11 +1,26 @@
 """Memory by name: the same words for Python and compiled code, in parts too."""
 
 import ctypes
+import gc
+import weakref
 
 import numpy as np
 import pytest
 
-from integrators.kernel.native.memory import Array, Integer, Memory, Part, Real, Within
+import problems
+from integrators import HBVM, Event, Gauss, LineIntegral, integrate, integrate_many
+from integrators.kernel.native.memory import (
+    Array,
+    Backward,
+    Integer,
+    Memory,
+    Part,
+    Pointer,
+    Pointers,
+    Real,
+    Within,
+    address_of,
+)
 
 
 class Inner(Part):
@@ -79,3 +94,119 @@ def test_compiled_code_reads_and_writes_a_part(memory):
     call = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)(machine.load(code))
     assert call(memory.address) == 12
     assert (memory.inner.rate, memory.inner.sizes[4]) == (1.0, 1.0)
+
+
+class Thing:
+    """What has an address, and something to be told of its end by."""
+
+    calls_back = False
+
+    def __init__(self, address):
+        self.address = address
+
+
+class Pointing(Memory):
+    code = Pointer()
+    several = Pointers()
+    above = Backward()
+
+
+def alive(thing):
+    """Return what tells whether a thing is there, which is given away here."""
+    return weakref.ref(thing)
+
+
+def test_what_a_memory_points_to_lives_as_long_as_the_memory():
+    memory = Pointing({}, {})
+    memory.code, memory.several = Thing(64), [Thing(128), None, np.ones(3)]
+    code, first = alive(memory.pointed[0]), alive(memory.pointed[1][0])
+    assert (memory.code, memory.several.addresses[:2].tolist()) == (64, [128, 0])
+    copy, content = memory.copy(), memory.content()
+    memory.code, memory.several = None, []
+    assert code() is not None
+    assert first() is not None
+    memory.renew(content)
+    del copy, content
+    assert (memory.code, memory.several.addresses[0]) == (64, 128)
+    assert code() is not None
+    assert first() is not None
+    del memory
+    gc.collect()
+    assert code() is None
+    assert first() is None
+
+
+def test_an_address_without_its_owner_is_refused():
+    memory = Pointing({}, {})
+    with pytest.raises(AttributeError):
+        memory.code = 64
+    with pytest.raises(AttributeError):
+        memory.several = [64]
+
+
+def test_a_memory_does_not_keep_the_one_that_keeps_it():
+    outer, inner = Pointing({}, {}), Pointing({}, {})
+    outer.code, inner.above = inner, outer
+    assert (outer.code, inner.above) == (inner.address, outer.address)
+    kept = alive(outer)
+    del outer, inner
+    assert kept() is None  # without a collection of circles
+
+
+def test_a_memory_knows_whether_something_that_it_points_to_calls_python_back():
+    memory, caller = Pointing({}, {}), Thing(64)
+    assert not memory.calls_back
+    caller.calls_back = True
+    memory.several = [Thing(8), caller]
+    assert memory.calls_back
+    outer = Pointing({}, {})
+    outer.code = memory
+    assert outer.calls_back
+    outer.code = None
+    assert not outer.calls_back
+
+
+BOUNCE = Event(lambda q: q[0], then=lambda y: [y[0], y[1], -y[2], y[3]])
+METHODS = {
+    "events": (
+        HBVM(k=4, s=2, h=0.1),
+        {"events": BOUNCE},
+    ),
+    "vectors": (HBVM(max_step=0.5), {"variations": ["y0"]}),
+    "Newton": (HBVM(k=4, s=2, h=0.1, solver="newton"), {"variations": ["y0"]}),
+    "line integral": (LineIntegral(k=8, s=4, h=0.1, invariants=["energy"]), {}),
+    "projected": (HBVM(tol=1e-8, projection="energy"), {}),
+    "reversible": (Gauss(s=6, tol=1e-9, steps="reversible"), {}),
+    "lanes": (HBVM(), {"events": Event(lambda q: q[0])}),
+    "lanes of fixed steps": (HBVM(k=4, s=2, h=0.1), {}),
+}
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_every_address_in_a_memory_is_that_of_something_that_it_holds(name, monkeypatch):
+    memories, made = [], Memory.__init__
+
+    def watched(memory, *arguments):
+        made(memory, *arguments)
+        memories.append(memory)
+
+    monkeypatch.setattr(Memory, "__init__", watched)
+    method, given = METHODS[name]
+    problem = problems.load("henon_heiles")
+    if "lanes" in name:
+        integrate_many(problem, method, starts=[problem.y0] * 9, times=[1.0], **given)
+    else:
+        integrate(problem, method, [1.0], **given)
+    seen = 0
+    for memory in memories:
+        for slot_name, slot in memory._all.items():
+            word = memory.word_of[slot_name]
+            if not isinstance(slot, Pointer) or not memory.words[word]:
+                continue
+            owner = memory.pointed[word]
+            owner = owner() if isinstance(owner, weakref.ref) else owner
+            # a search in lanes is turned from one lane to the next
+            if owner is not None and not (name == "lanes" and slot_name in ("own", "partial")):
+                assert memory.words[word] == address_of(owner), slot_name
+                seen += 1
+    assert seen >= len(memories) > 0

@@ -86,3 +86,25 @@ def test_a_handler_that_raises_nothing_ends_nothing():
     finally:
         signal.signal(signal.SIGINT, before)
     assert (made.status, len(seen) > 10) == (Status.FINISHED, True)
+
+
+def test_a_field_in_python_costs_the_calls_of_no_other_program():
+    """Before, every later call of the kernel in the process exchanged the handler of Ctrl-C."""
+    integrate(TURN, HBVM(k=4, s=2, h=0.1), [0.2])
+    stepper = HBVM(k=4, s=2, h=0.1).compile(HENON_HEILES.system).start(HENON_HEILES.y0)
+    called = HBVM(k=4, s=2, h=0.1).compile(TURN.system).start(TURN.y0)
+    exchanged, exchange = [], signal.signal
+
+    def watched(*arguments):
+        exchanged.append(arguments)
+        return exchange(*arguments)
+
+    signal.signal = watched
+    try:
+        stepper.step()
+        stepper.advance([1.0])
+        assert exchanged == []
+        called.step()
+        assert len(exchanged) == 2
+    finally:
+        signal.signal = exchange

@@ -1,0 +1,35 @@
+"""The compiled functions of the kernel in this process, by the modules that they are written in.
+
+What takes time, importing numba and such a module, is done only where one has to be compiled.
+"""
+
+from integrators.kernel.native.engine import Engine
+
+steps = Engine(
+    "step.entry", "entry", "operation ctx partial between count times targets parts first out budget"
+)
+"""``steps(what, ctx, ...)``: see `integrators.kernel.step.entry`."""
+
+solver = Engine("implicit.entry", "entry", "ctx memory started")
+"""The implicit solver; its address is what `integrators.kernel.step.solver_switch` calls."""
+
+line = Engine("line.entry", "entry", "operation ctx")
+"""Line integrals; its address is what the steps call where there is a `Context.line`."""
+
+look = Engine("events.entry", "entry", "ctx search")
+"""``look(ctx, search)``: see `integrators.kernel.events.entry`; the steps call its address too."""
+
+follow = Engine("tangent.entry", "entry", "operation ctx memory")
+"""``follow(what, ctx, tangents)``: see `integrators.kernel.tangent.entry`; the steps call its address."""
+
+record = Engine("adjoint.entry", "record", "event ctx tape")
+"""``record(event, ctx, tape)``: see `integrators.kernel.adjoint.entry`; the steps call its address."""
+
+pull = Engine("adjoint.entry", "pull", "ctx pullback")
+"""``pull(ctx, pullback)``: see `integrators.kernel.adjoint.entry`."""
+
+run = Engine("ensemble.loop", "run", "group partial budget")
+"""``run(group, partial, budget)``: see `integrators.kernel.ensemble.loop`."""
+
+run_own = Engine("ensemble.own", "run", "group budget")
+"""``run_own(group, budget)``: see `integrators.kernel.ensemble.own`."""
