@@ -7,15 +7,9 @@ from integrators.kernel.parts.estimate import AT_START
 from integrators.kernel.parts.surfaces import AT_ORIGIN
 from integrators.kernel.simd.memory import call_field, get, put, total
 from integrators.kernel.step.begin import INFINITY
+from integrators.kernel.step.coefficients import coefficient
 from integrators.kernel.step.control import RETREAT, SHORTEST, SHRINK, TIME_TOLERANCE
-from integrators.kernel.step.estimate import (
-    NARROWEST,
-    SMOOTH_GAP,
-    block_size,
-    coefficient,
-    estimate,
-    is_gap,
-)
+from integrators.kernel.step.estimate import NARROWEST, SMOOTH_GAP, block_size, estimate, is_gap
 
 BREAKPOINT_OFFSET = 1e-12  # part of a step: as near to a breakpoint the field is looked at
 

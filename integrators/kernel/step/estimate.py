@@ -17,14 +17,17 @@ from integrators.kernel.parts.estimate import (
     LAST,
     MIDDLE,
 )
-from integrators.kernel.simd.lanes import fma
-from integrators.kernel.simd.memory import get, put, splat8, sums, total
+from integrators.kernel.simd.memory import get, put, total
 from integrators.kernel.simd.operations import greatest, least, size, where
 from integrators.kernel.step.begin import prepare, set_step, start_plain
+from integrators.kernel.step.coefficients import (
+    coefficient,
+    coefficient_of_two,
+    take_coefficients,
+)
 from integrators.kernel.step.control import INFINITY, TINY
 from integrators.kernel.step.fixed_point import evaluate
 from integrators.kernel.step.rule import FIRST_AT_REST, LEAST_BLOCK, RESTART, SMALLEST
-from integrators.kernel.step.stages import offset
 
 # Part of a block that rounding accounts for in a step that the fixed-point iteration solves
 ROUNDING_PART = 1e-13
@@ -39,67 +42,6 @@ SMOOTH_GAP = 100.0
 NOT_DECAYING, AT_REST = 0.1, 0.1
 # Part of the field's mean that its other coefficients are at most where it does not change
 EQUAL_VALUES = 1e-14
-
-
-@compiled
-def coefficient(ctx, row, which):
-    """Return eight partial sums of what row ``which`` of the estimators makes of a row of values."""
-    values, i, chunks = ctx.values, ctx.lanes * row, ctx.chunks
-    table = ctx.estimate.estimators + 8 * chunks * which
-    if ctx.route == 8:
-        return get(table, 0) * get(values, i)
-    if ctx.route == 16:
-        return fma(get(table, 8), get(values, i + 8), get(table, 0) * get(values, i))
-    result = splat8(0.0)
-    for chunk in range(chunks):
-        result = fma(get(table, 8 * chunk), get(values, i + offset(ctx, chunk)), result)
-    return result
-
-
-@compiled
-def take_coefficients(ctx):
-    """Set what is known of the field from its values in the solved step, row by row."""
-    for d in range(ctx.rows):
-        low = (
-            coefficient(ctx, d, GAMMA_0),
-            coefficient(ctx, d, GAMMA_1),
-            coefficient(ctx, d, GAMMA_2),
-            coefficient(ctx, d, GAMMA_3),
-        )
-        high = (
-            coefficient(ctx, d, BEFORE_ERROR),
-            coefficient(ctx, d, AT_ERROR),
-            coefficient(ctx, d, BEFORE_LAST),
-            coefficient(ctx, d, LAST),
-        )
-        put(ctx.estimate.coefficients, 8 * d, abs(sums(*low, *high)))
-
-
-@compiled
-def coefficient_of_two(table, which, low, high):
-    """As `coefficient`, of two times eight values."""
-    return fma(get(table, 16 * which + 8), high, get(table, 16 * which) * low)
-
-
-@compiled
-def take_coefficients_of_two(ctx):
-    """As `take_coefficients`, for two times eight stages: the same sums, with each value loaded once."""
-    gammas, table, values = ctx.estimate.coefficients, ctx.estimate.estimators, ctx.values
-    for d in range(ctx.rows):
-        x, y = get(values, 16 * d), get(values, 16 * d + 8)
-        low = (
-            coefficient_of_two(table, GAMMA_0, x, y),
-            coefficient_of_two(table, GAMMA_1, x, y),
-            coefficient_of_two(table, GAMMA_2, x, y),
-            coefficient_of_two(table, GAMMA_3, x, y),
-        )
-        high = (
-            coefficient_of_two(table, BEFORE_ERROR, x, y),
-            coefficient_of_two(table, AT_ERROR, x, y),
-            coefficient_of_two(table, BEFORE_LAST, x, y),
-            coefficient_of_two(table, LAST, x, y),
-        )
-        put(gammas, 8 * d, abs(sums(*low, *high)))
 
 
 @for_both_widths
@@ -306,10 +248,7 @@ def estimate(ctx):
     """
     discontinuities = ctx.discontinuities
     h = abs(ctx.h)
-    if ctx.route == 16:
-        take_coefficients_of_two(ctx)
-    else:
-        take_coefficients(ctx)
+    take_coefficients(ctx)
     doubtful = measure_blocks(ctx)
     if ctx.surfaces.crossed:
         doubtful = True
