@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from integrators.caveats import detects_discontinuities
+from integrators.caveats import FEWEST, detects_discontinuities
 from integrators.events.event import Event
 from integrators.kernel import tables
 from integrators.kernel.along import batch_along
@@ -568,6 +568,7 @@ class AdaptiveProgram(HBVMProgram):
             self.from_cache = self.from_cache and self._sides.from_cache
         self.projected = projected
         self._energy = self._energy_code() if projected else None
+        self._line = 2.0 ** (-52.0 / middle) if k >= FEWEST else 0.0  # where degrees from that on vanish
         looks = detects_discontinuities(k, system) and not self.kept
         self._doubt, self._slowest = _decays(k, self.degree, tol, middle, looks)
         self.compile_seconds += binary.clock() - started
@@ -675,6 +676,7 @@ class AdaptiveProgram(HBVMProgram):
         context.surfaces.code = self._sides
         context.surfaces.count = self._surfaces
         context.estimate.absolute[:] = self._absolute
+        context.estimate.line = self._line
         context.estimate.asks = int(self.atol is None or np.any(np.greater(self.atol, 0.0)))
         self.limit(context, 0.0)
         context.controller.stop = context.controller.length_limit = math.inf

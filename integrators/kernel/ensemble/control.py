@@ -78,9 +78,12 @@ class Control:
         """Set `error`, `quadrature_error`, where blocks are `certain` and `visible`; see `estimate`."""
         from integrators.kernel.step import estimate as rules  # imports numba, which compiling needs anyhow
         from integrators.kernel.step.discontinuities import gap_allowed
+        from integrators.kernel.step.rounding import is_evident
 
         w, b = self.w, self.w.b
-        error, quadrature_error = (w.variable(w.kind, w.zero.value) for _ in range(2))
+        error, quadrature_error, evident_error, evident_quadrature_error = (
+            w.variable(w.kind, w.zero.value) for _ in range(4)
+        )
         none = w.zero.compare("!=", 0.0)
         doubtful, visible, changing = (w.variable(w.bits, none) for _ in range(3))
         most_apart = gap_allowed(
@@ -133,15 +136,28 @@ class Control:
                 start = w.at(block, width, first)
                 scale, slope, gamma_error, gamma_last = (w.get(getattr(w, name), start) for name in MEASURED)
                 mass = w.unity / self.speed(start)
-                scale = rules.size_in_step(scale, tops[0] * mass)
+                largest = tops[0] * mass
+                scale = rules.size_in_step(scale, largest)
                 slope = rules.floored_slope(slope, tops[1] * mass, self.number("least_slope"))
-                for gamma, worst in ((gamma_error, error), (gamma_last, quadrature_error)):
-                    raise_to(worst, where(slope > 0.0, rules.local_error(self.h, gamma, slope, scale), 0.0))
+                for gamma, worst, evident in (
+                    (gamma_error, error, evident_error),
+                    (gamma_last, quadrature_error, evident_quadrature_error),
+                ):
+                    own = where(slope > 0.0, rules.local_error(self.h, gamma, slope, scale), 0.0)
+                    raise_to(worst, own)
+                    raise_to(evident, where(is_evident(self.h, gamma, largest), own, 0.0))
                 note(visible, rules.is_visible(self.h, gamma_error, scale))
                 note(doubtful, w.get(w.array(Group.slots["gaps"]), start) > most_apart * scale)
 
             w.each(blocks, compare)
         self.error, self.quadrature_error = (Value(b, b.load(worst)) for worst in (error, quadrature_error))
+        self.evident = [
+            Value(b, b.load(evident)) >= own
+            for evident, own in (
+                (evident_error, self.error),
+                (evident_quadrature_error, self.quadrature_error),
+            )
+        ]
         self.certain = b.and_(b.not_(b.load(doubtful)), b.load(changing))
         self.visible = b.load(visible)
 
@@ -224,7 +240,7 @@ class Control:
         error_aim, quadrature_error_aim = self.number("error_aim"), self.number("quadrature_error_aim")
         self.error = log_of_order(self.error, self.number("error_power"))
         self.quadrature_error = log_of_order(self.quadrature_error, self.number("quadrature_error_power"))
-        factor = as_errors_allow(
+        factor, in_doubt = as_errors_allow(
             self.error,
             self.row("previous_error"),
             error_aim,
@@ -233,9 +249,11 @@ class Control:
             quadrature_error_aim,
             limited,
             log_ratio(self.h / self.row("previous_length").absolute()),
+            *self.evident,
         )
         self.limit = self.row("length_limit") * APPROACH
         iterations = Value(b, b.load(w.iterations)) - self.row("before")
+        self.certain = b.and_(self.certain, b.not_(in_doubt.value))
         self.factor = as_iterations_allow(
             bounded(factor, MOST_GROWTH), self.number("target_iterations"), iterations, self.h, self.limit
         )
@@ -253,7 +271,6 @@ class Control:
         self.judge()
         good = self.all(
             b.load(w.alive),
-            self.certain,
             is_good(
                 self.error,
                 self.number("allowed_error"),
@@ -267,6 +284,7 @@ class Control:
         time_left, since = (self.row("stop") - t) - low, self.row("since") + 1.0
         good = self.all(
             good,
+            self.certain,
             self.free,
             (time_left * length).compare(">", 0.0),
             time_left.absolute().compare(">", length.absolute()),

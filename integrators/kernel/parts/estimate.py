@@ -21,6 +21,12 @@ class Estimate(Part):
     slow_decay = Array("blocks.count")  # and the largest that does not fall off as a smooth field's do
     fastest = Array("blocks.count")  # scale in each group, as a velocity,
     steepest = Array("blocks.count")  # and slope
+    noise = Array("blocks.count")  # coefficients that rounding explains; see `step.rounding`
+    largest = Array("blocks.groups")  # the largest size, as a velocity, that a block of each group has had
+    line = Real()  # part of a step on which noise is measured; 0: it is not
+    measured = Integer()  # 1: noise was measured in the step that was estimated
+    evident_error = Real()  # the estimated errors, of what is more than rounding in any field
+    evident_quadrature_error = Real()
     least_slope = Real()  # of a block's field beside the largest in its group, where errors are estimated
     error_decay = Real()  # of coefficients from one degree to the next, where the error is allowed
     quadrature_error_decay = Real()  # the same where the quadrature error is

@@ -27,6 +27,8 @@ def reset(ctx, start):
         put(ctx.error, 8 * i, splat8(0.0))
     read(ctx, ctx.state, start)
     ctx.samples_written = 0
+    for g in range(ctx.blocks.groups):
+        ctx.estimate.largest[g] = 0.0
     begin_anew(ctx)
 
 

@@ -3,7 +3,7 @@
 from math import log
 
 from integrators.kernel.native.jit import for_both_widths
-from integrators.kernel.simd.operations import binary_log, greatest, least, size, where
+from integrators.kernel.simd.operations import binary_log, greatest, least, opposite, size, where
 
 SAFETY, SHRINK = 0.9, 0.2  # of the length from one step to the next
 # Of what would have met the tolerance, after a step whose error was too large (logarithms)
@@ -40,13 +40,13 @@ def log_factor(aim, estimate, previous, change):
     ----------
     aim, estimate, previous : float
         Logarithms of the tolerance, of the estimated error of this step, and of that of
-        the step before (infinite: unknown), each divided by the order of the error.
+        the step before (infinite: none, or unknown), each divided by the order of the error.
     change : float
         Logarithm of this step's length relative to that of the step before.
     """
     factor = aim - estimate
     trend = change + greatest(aim - FORESEEN, previous) - estimate
-    trend = where(previous < INFINITY, where(trend < 0.0, trend, TRUST * trend), 0.0)
+    trend = where(size(previous) < INFINITY, where(trend < 0.0, trend, TRUST * trend), 0.0)
     return where(
         factor < 0.0, SHRINK_EXPONENT * factor, greatest(CAUTION * factor, factor - SHORTFALL) + trend
     )
@@ -80,9 +80,10 @@ def quadrature_error_power(k):
 def log_of_order(error, power):
     """Return the logarithm of an estimated error divided by its order, whose inverse is ``power``.
 
-    The logarithm is too small by up to 0.06: enough where an order divides it.
+    The logarithm is too small by up to 0.06: enough where an order divides it. That of 0, nothing beyond
+    rounding, is -infinity.
     """
-    return power * (LOG_2 * binary_log(greatest(error, TINY)))
+    return where(error > 0.0, power * (LOG_2 * binary_log(error)), -INFINITY)
 
 
 @for_both_widths
@@ -101,6 +102,8 @@ def as_errors_allow(
     quadrature_error_aim,
     limited,
     change,
+    error_is_evident,
+    quadrature_error_is_evident,
 ):
     """Return the logarithm of the next step's length relative to this one's, as the estimates allow.
 
@@ -114,12 +117,24 @@ def as_errors_allow(
         if that is limited too.
     change : float
         Logarithm of this step's length relative to that of the step before.
+    error_is_evident, quadrature_error_is_evident : bool
+        Whether the estimates are of more than rounding explains in any field.
+
+    Returns
+    -------
+    factor : float
+    in_doubt : bool
+        Whether the step is shortened only by an estimate that may be rounding.
     """
     by_error = log_factor(error_aim, error, previous_error, change)
     by_quadrature_error = log_factor(
         quadrature_error_aim, quadrature_error, previous_quadrature_error, change
     )
-    return where(limited, least(by_quadrature_error, by_error), by_error)
+    factor = where(limited, least(by_quadrature_error, by_error), by_error)
+    evident = (error_is_evident & (by_error < 0.0)) | (
+        quadrature_error_is_evident & limited & (by_quadrature_error < 0.0)
+    )
+    return factor, (factor < 0.0) & opposite(evident)
 
 
 @for_both_widths

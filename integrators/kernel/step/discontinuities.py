@@ -10,6 +10,7 @@ from integrators.kernel.step.begin import INFINITY
 from integrators.kernel.step.coefficients import coefficient
 from integrators.kernel.step.control import RETREAT, SHORTEST, SHRINK, TIME_TOLERANCE
 from integrators.kernel.step.estimate import NARROWEST, SMOOTH_GAP, block_size, estimate, is_gap
+from integrators.kernel.step.rounding import known_noise, measure_noise
 
 BREAKPOINT_OFFSET = 1e-12  # part of a step: as near to a breakpoint the field is looked at
 
@@ -122,15 +123,26 @@ def previous_end(ctx, d):
 
 @compiled
 def differs_at_an_end(ctx):
-    """Whether the field at an end of the solved step is far from what its nodes say there.
+    """Whether the field at an end of the solved step is farther from what its nodes say there than noise."""
+    ctx.discontinuities.undone = 0
+    if abs(ctx.h) <= NARROWEST * abs(ctx.t0):
+        return False
+    differs = look_at_ends(ctx)
+    if (differs or ctx.discontinuities.undone) and not ctx.estimate.measured:
+        measure_noise(ctx)
+        differs = look_at_ends(ctx)
+    return differs
 
-    Where it may jump, at a breakpoint, it is looked at just inside the step.
+
+@compiled
+def look_at_ends(ctx):
+    """As `differs_at_an_end`, by noise only where that was measured.
+
+    Where the field may jump, at a breakpoint, it is looked at just inside the step.
     """
     discontinuities, surfaces = ctx.discontinuities, ctx.surfaces
     h, t = abs(ctx.h), ctx.t0
     discontinuities.undone = 0
-    if h <= NARROWEST * abs(t):
-        return False
     rows, lanes, second = ctx.rows, ctx.lanes, ctx.second
     # Stages at both ends, in memory that the solved step does not need any more; idle lanes repeat the last.
     stages, times, values = ctx.scratch.old_stages, ctx.times, ctx.scratch.sums
@@ -159,7 +171,8 @@ def differs_at_an_end(ctx):
             after = 0.0
         far = max(finite(before), finite(after))
         # A crossing beyond the last node is no smooth field's distance from its polynomial.
-        smooth = 0.0 if surfaces.crossed else SMOOTH_GAP * discontinuities.last_coefficients[d]
+        smooth = 0.0 if surfaces.crossed else discontinuities.last_coefficients[d]
+        smooth = SMOOTH_GAP * max(smooth, known_noise(ctx, d))
         if far > smooth and far > least * block_size(ctx, ctx.blocks.of_row[d]):
             return True
         if discontinuities.boundary == EXTRAPOLATED and differs_from_previous(ctx, d, values[lanes * d]):
@@ -184,9 +197,8 @@ def differs_from_previous(ctx, d, value):
     """Whether the polynomial of the previous step is far from the field's value at its end, in row d."""
     far = finite(abs(value - previous_end(ctx, d)))
     least = ctx.discontinuities.negligible / (abs(ctx.controller.previous_length) * ctx.tables.nodes[0])
-    return far > SMOOTH_GAP * ctx.discontinuities.previous_last_coefficients[d] and far > least * block_size(
-        ctx, ctx.blocks.of_row[d]
-    )
+    last = max(ctx.discontinuities.previous_last_coefficients[d], known_noise(ctx, d))
+    return far > SMOOTH_GAP * last and far > least * block_size(ctx, ctx.blocks.of_row[d])
 
 
 @compiled

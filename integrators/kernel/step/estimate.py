@@ -25,8 +25,9 @@ from integrators.kernel.step.coefficients import (
     coefficient_of_two,
     take_coefficients,
 )
-from integrators.kernel.step.control import INFINITY, TINY
+from integrators.kernel.step.control import INFINITY, TINY, is_good
 from integrators.kernel.step.fixed_point import evaluate
+from integrators.kernel.step.rounding import beyond_noise, is_evident, known_noise, measure_noise
 from integrators.kernel.step.rule import FIRST_AT_REST, LEAST_BLOCK, RESTART, SMALLEST
 
 # Part of a block that rounding accounts for in a step that the fixed-point iteration solves
@@ -190,9 +191,9 @@ def note_slow_decay(ctx):
     for d in range(ctx.rows):
         gammas = ctx.estimate.coefficients + 8 * d
         low = lowest(gammas[GAMMA_1], gammas[GAMMA_2], gammas[GAMMA_3])
-        high = greatest(gammas[BEFORE_LAST], gammas[LAST])
+        b = ctx.blocks.of_row[d]
+        high = beyond_noise(greatest(gammas[BEFORE_LAST], gammas[LAST]), known_noise(ctx, d))
         if is_doubtful(low, high, ctx.discontinuities.doubt) and does_not_decay(ctx, d, gammas[LAST]):
-            b = ctx.blocks.of_row[d]
             slow_decay[b] = greatest(slow_decay[b], high)
 
 
@@ -246,9 +247,49 @@ def estimate(ctx):
     jump, they are about 1. No step is good enough then by the block's own size, and `Estimate.expected`, that
     which it will reach, takes its place until `Estimate.borrowed` is 0 again.
     """
+    note_sizes(ctx)
+    take_coefficients(ctx)
+    ctx.estimate.measured = 0
+    error, quadrature_error = judge_blocks(ctx)
+    if (ctx.discontinuities.not_smooth or fails(ctx, error, quadrature_error)) and not fails(
+        ctx, ctx.estimate.evident_error, ctx.estimate.evident_quadrature_error
+    ):
+        error, quadrature_error = estimate_beyond_noise(ctx, error, quadrature_error)
+    compare_ends(ctx)
+    return error, quadrature_error
+
+
+@compiled
+def fails(ctx, error, quadrature_error):
+    """Whether a step with these errors is not good enough."""
+    controller = ctx.controller
+    return not is_good(error, controller.allowed_error, quadrature_error, controller.allowed_quadrature_error)
+
+
+@compiled
+def estimate_beyond_noise(ctx, error, quadrature_error):
+    """Return the estimates of what is beyond noise, which is measured unless it has been."""
+    if ctx.estimate.measured:
+        return error, quadrature_error
+    measure_noise(ctx)
+    return judge_blocks(ctx)
+
+
+@compiled
+def note_sizes(ctx):
+    """Let the largest sizes of the groups be at least those of the present state."""
+    blocks, largest = ctx.blocks, ctx.estimate.largest
+    for d in range(ctx.rows):
+        b = blocks.of_row[d]
+        g = blocks.group[b]
+        largest[g] = greatest(size(momentum(ctx, d)) * blocks.speed[b], largest[g])
+
+
+@compiled
+def judge_blocks(ctx):
+    """Return the two errors that `estimate` returns, from the coefficients."""
     discontinuities = ctx.discontinuities
     h = abs(ctx.h)
-    take_coefficients(ctx)
     doubtful = measure_blocks(ctx)
     if ctx.surfaces.crossed:
         doubtful = True
@@ -262,7 +303,7 @@ def estimate(ctx):
         discontinuities.negligible,
     )
     narrow = h <= NARROWEST * abs(ctx.t0)
-    error, quadrature_error = 0.0, 0.0
+    error, quadrature_error, evident, evident_quadrature = 0.0, 0.0, 0.0, 0.0
     not_smooth = borrowed = 0
     rescaled, slopes, absolute = ctx.estimate.rescaled, ctx.estimate.slope, ctx.estimate.absolute
     for b in range(ctx.blocks.count):
@@ -270,6 +311,7 @@ def estimate(ctx):
         slope = floored_slope(slopes[b], steepest, ctx.estimate.least_slope)
         if slope > 0.0:
             own, scale = own_size(ctx, b), block_size(ctx, b)
+            largest = ctx.estimate.largest[ctx.blocks.group[b]] * ctx.blocks.mass[b]
             gamma_error, gamma_last, high = (
                 ctx.estimate.gamma_error[b],
                 ctx.estimate.gamma_last[b],
@@ -287,12 +329,17 @@ def estimate(ctx):
                     most, most_quadrature_error = SLIGHT * allowed, SLIGHT * allowed_quadrature_error
                 elif h * high > negligible * scale and not narrow:
                     not_smooth = 1
+                    evident = INFINITY if is_evident(h, high, largest) else evident
             block_error = least(most, local_error(h, gamma_error, slope, scale))
             error = greatest(error, block_error)
+            if is_evident(h, gamma_error, largest):
+                evident = greatest(evident, block_error)
             if absolute[b] > own:
                 scale = max(own, ctx.estimate.expected[b]) if rescaled else own
             block_quadrature_error = least(most_quadrature_error, local_error(h, gamma_last, slope, scale))
             quadrature_error = greatest(quadrature_error, block_quadrature_error)
+            if is_evident(h, gamma_last, largest):
+                evident_quadrature = greatest(evident_quadrature, block_quadrature_error)
             if rescaled:
                 times = scale / own
                 fits = (
@@ -302,7 +349,7 @@ def estimate(ctx):
                 if not fits or (doubtful and h * high > negligible * own):
                     borrowed = 1
     discontinuities.not_smooth, ctx.estimate.borrowed = not_smooth, borrowed
-    compare_ends(ctx)
+    ctx.estimate.evident_error, ctx.estimate.evident_quadrature_error = evident, evident_quadrature
     return error, quadrature_error
 
 
@@ -338,6 +385,9 @@ def measure_blocks(ctx):
             error_decay,
             quadrature_error_decay,
         )
+        noise = known_noise(ctx, d)
+        error, quadrature_error = beyond_noise(error, noise), beyond_noise(quadrature_error, noise)
+        high = beyond_noise(high, noise)
         doubtful |= is_doubtful(low, high, doubt)
         changing |= changes(low, high, gammas[GAMMA_0])
         scale[b] = greatest(scale[b], size(momentum(ctx, d)) + h * slope)
@@ -396,6 +446,18 @@ def estimate_implicit(ctx):
     result = estimate(ctx)
     ctx.values = kept
     ctx.counters.evaluations += ctx.k
+    return result
+
+
+@compiled
+def estimate_again(ctx, error, quadrature_error, implicit):
+    """Return the estimates of what is beyond noise, after `estimate` or `estimate_implicit`."""
+    if not implicit:
+        return estimate_beyond_noise(ctx, error, quadrature_error)
+    kept = ctx.values
+    ctx.values = ctx.scratch.sums
+    result = estimate_beyond_noise(ctx, error, quadrature_error)
+    ctx.values = kept
     return result
 
 

@@ -42,7 +42,12 @@ from integrators.kernel.step.control import (
     room_for_longer,
 )
 from integrators.kernel.step.discontinuities import has_discontinuity, keep_end, record, undo
-from integrators.kernel.step.estimate import estimate, estimate_implicit, log_decay
+from integrators.kernel.step.estimate import (
+    estimate,
+    estimate_again,
+    estimate_implicit,
+    log_decay,
+)
 from integrators.kernel.step.finish import count_step, finish
 from integrators.kernel.step.fixed_point import iterate_measured
 from integrators.kernel.step.graze import grazes
@@ -136,16 +141,21 @@ def iterate(ctx):
 
 @compiled
 def length_factor(ctx, error, quadrature_error, most_growth):
-    """Return the next step's length relative to this one's, from what is estimated for this one."""
-    controller = ctx.controller
+    """Return the next step's length relative to this one's, from what is estimated for this one.
+
+    And whether it is shortened by an estimate that may be rounding.
+    """
+    controller, estimated = ctx.controller, ctx.estimate
     if not error < INFINITY:
-        return SHRINK
+        return SHRINK, False
     h, previous = ctx.h, controller.previous_length
     known = previous != 0.0
+    evident = estimated.evident_error >= error
+    quadrature_evident = estimated.evident_quadrature_error >= quadrature_error
     error = log_of_order(error, error_power(controller.error_degree))
     quadrature_error = log_of_order(quadrature_error, quadrature_error_power(ctx.k))
     controller.error_ahead, controller.quadrature_error_ahead = error, quadrature_error
-    factor = as_errors_allow(
+    factor, in_doubt = as_errors_allow(
         error,
         controller.previous_error if known else INFINITY,
         controller.error_aim,
@@ -154,8 +164,10 @@ def length_factor(ctx, error, quadrature_error, most_growth):
         controller.quadrature_error_aim,
         controller.allowed_quadrature_error < INFINITY,
         log_ratio(h / previous) if known else 0.0,
+        evident,
+        quadrature_evident,
     )
-    return bounded(factor, most_growth)
+    return bounded(factor, most_growth), in_doubt
 
 
 @compiled
@@ -335,11 +347,16 @@ def accepts(ctx, outcome, iterations, implicit):
     """
     controller, surfaces = ctx.controller, ctx.surfaces
     error, quadrature_error = estimate_attempt(ctx, outcome, implicit)
-    factor = length_factor(ctx, error, quadrature_error, MOST_GROWTH if controller.attempts == 0 else 1.0)
+    most_growth = MOST_GROWTH if controller.attempts == 0 else 1.0
+    factor, in_doubt = length_factor(ctx, error, quadrature_error, most_growth)
     if outcome == DONE and ctx.estimate.constant_field and abs(ctx.h) > controller.longest_constant:
         reject(ctx, outcome, controller.longest_constant / abs(ctx.h), implicit)
         return False
     good = is_good(error, controller.allowed_error, quadrature_error, controller.allowed_quadrature_error)
+    if good and in_doubt:
+        # A trend of noise would go on for ever: its coefficients do not fall with the length.
+        error, quadrature_error = estimate_again(ctx, error, quadrature_error, implicit)
+        factor, _ = length_factor(ctx, error, quadrature_error, most_growth)
     if surfaces.code and (surfaces.locating or (surfaces.across != NO_SURFACE and not good)):
         verdict = locate(ctx, outcome, good)
         if verdict == AGAIN:
