@@ -6,10 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from problems.analysis.invariants import evaluate
+from problems.analysis import deviations
 from problems.analysis.structure import has_kinks, switches_in_time
-from problems.calculus.function import Function
-from problems.double_double import DD
 from problems.emit.leaving import leaves_range
 from problems.problem import Problem, System
 from problems.trace.graph import T
@@ -95,8 +93,8 @@ def warnings(
     )
 
 
-Losses = dict[str, tuple[float, float, float]]
-"""By the name of what is conserved: the first time at which it had changed, by how much, and its size."""
+Losses = dict[str, tuple[float, float]]
+"""By the name of what is conserved: the first time at which it had changed, and its error there."""
 
 
 def lost_invariants(
@@ -129,40 +127,22 @@ def lost_invariants(
     times = np.broadcast_to(times, states.shape[:2])[:, ::-1][:, ::every][:, ::-1].reshape(-1)
     states = states[:, ::-1][:, ::every][:, ::-1]
     owner = np.repeat(np.arange(len(par)), states.shape[1])
-    before, after = starts[owner].T, states.reshape(owner.size, -1).T
-
-    def values(function: Function, columns: Array, which: Any) -> list[DD]:
-        return evaluate(function, 0.0, *map(np.ascontiguousarray, (columns, par[owner[which]].T)))
-
-    for name in promised:
-        invariant = system.invariants[name]
-        with np.errstate(all="ignore"):
-            first = [DD(x.hi[owner], x.lo[owner]) for x in evaluate(invariant, 0.0, starts.T, par.T)]
-            last = values(invariant, after, slice(None))
-            change = np.linalg.norm([(b - a).rounded() for a, b in zip(first, last, strict=True)], axis=0)
-            size = np.linalg.norm([a.rounded() for a in first], axis=0)
-            limit = np.maximum(LOST, PER_STEP * conserved[name] * steps)[owner]
-            lost = np.flatnonzero((change > limit * size) & np.isfinite(change))
-            if lost.size and name == "energy":
-                # Terms that cancel are rounded at their own size.
-                for columns in (before[:, lost], after[:, lost]):
-                    slopes = values(system.gradient(invariant), columns, lost)
-                    terms = np.abs([slope.rounded() for slope in slopes] * columns).sum(axis=0)
-                    size[lost] = np.fmax(size[lost], terms)
-                lost = lost[change[lost] > limit[lost] * size[lost]]
-        for i in lost[::-1]:
-            loss = float(times[i]), float(change[i]), float(size[i])
-            losses[owner[i]][name] = loss
+    limit = np.maximum(LOST, [[PER_STEP * conserved[name]] for name in promised] * steps)[:, owner]
+    flat = states.reshape(owner.size, -1)
+    errors = deviations.errors(system, par.T, flat, None, starts=(0.0, starts), owner=owner, names=promised)
+    for name, most in zip(promised, limit, strict=True):
+        for i in np.flatnonzero((errors[name] > most) & np.isfinite(errors[name]))[::-1]:
+            losses[owner[i]][name] = float(times[i]), float(errors[name][i])
     return losses
 
 
 def of_losses(losses: Losses) -> tuple[str, ...]:
     """Return the sentences on what has changed though the method conserves it."""
     return tuple(
-        f"{name} has changed by {change:.1e} (its size is {size:.1e}; first seen at t = {t!r}), though "
+        f"{name} has changed by {error:.1e} relative to its terms (first seen at t = {t!r}), though "
         "the method conserves it: the field may have a pulse or a bump that is narrower than the steps; "
         "give breakpoints or max_step."
-        for name, (t, change, size) in losses.items()
+        for name, (t, error) in losses.items()
     )
 
 

@@ -23,6 +23,7 @@ from integrators.plain import (
 from integrators.protocol import Array, MethodBase, Stats, Status, Trajectories
 from integrators.segments import Segments
 from integrators.solution import Occurrences, Solution, library, of_type, write_whole
+from problems.analysis import deviations, invariants
 from problems.checks import File, checked_arguments, readable
 from problems.errors import printable, shown
 from problems.problem import Problem
@@ -204,8 +205,10 @@ class Solutions(Trajectories):
 
     def invariants(self) -> dict[str, Array]:
         """Return the invariants, shape (n, m), or (n, m, k) of a vector, by name."""
-        system, members = self.problem.system, zip(self._segments(), self._times, self.y, strict=True)
-        return self._gathered([segments.invariants(system, t, y) for segments, t, y in members])
+        par, _, owner = self._segments()
+        system, (n, m, dim) = self.problem.system, self.y.shape
+        found = invariants.invariants(system, par[owner].T, self.y.reshape(-1, dim), self._times.reshape(-1))
+        return {name: values.reshape(n, m, *values.shape[1:]) for name, values in found.items()}
 
     def errors(self) -> dict[str, Array]:
         """Return the deviation of each invariant from its initial value, shape (n, m), by name.
@@ -213,18 +216,31 @@ class Solutions(Trajectories):
         As `problems.Problem.errors`; NaN at times that a trajectory did not reach. After an event that
         changes the state they are relative to the state after it, as in `Solution.errors`.
         """
-        system, members = self.problem.system, zip(self._segments(), self._times, self.y, strict=True)
-        return self._gathered([segments.errors(system, t, y) for segments, t, y in members])
+        par, starts, owner = self._segments()
+        states, times = self.y.reshape(-1, self.y.shape[2]), self._times.reshape(-1)
+        found = deviations.errors(self.problem.system, par.T, states, times, starts=starts, owner=owner)
+        return {name: values.reshape(self.y.shape[:2]) for name, values in found.items()}
 
-    def _segments(self) -> Iterator[Segments]:
-        """Return the segments of each trajectory between events that change the state or the parameters."""
-        t0 = self.problem.t0
-        for i, (start, par) in enumerate(zip(self.starts, self.par, strict=True)):
-            events = self.events[i] if self.events else {}
-            yield Segments.from_events(t0, start, par, events, 1.0 if self.t_stop[i] >= t0 else -1.0)
+    def _segments(self) -> tuple[Array, tuple[Array, Array], NDArray[np.int64]]:
+        """Return the segments of all trajectories between events that change the state or the parameters.
 
-    def _gathered(self, members: list[dict[str, Array]]) -> dict[str, Array]:
-        return {name: np.stack([member[name] for member in members]) for name in members[0]}
+        Their parameters, their times and states, and the number of the one that each state belongs to.
+        """
+        n, m, t0 = len(self), self.y.shape[1], self.problem.t0
+        acted = [any(hits.after is not None for hits in events.values()) for events in self.events]
+        if not any(acted):
+            return self.par, (np.full(n, t0), self.starts), np.repeat(np.arange(n), m)
+        segments = [
+            Segments.from_events(t0, start, par, events, 1.0 if stop >= t0 else -1.0)
+            for start, par, events, stop in zip(self.starts, self.par, self.events, self.t_stop, strict=True)
+        ]
+        first = np.cumsum([0, *(part.t.size for part in segments[:-1])])
+        owner = [
+            number + part.places(t, y)
+            for number, part, t, y in zip(first, segments, self._times, self.y, strict=True)
+        ]
+        par, t, y = (np.concatenate([getattr(part, name) for part in segments]) for name in ("par", "t", "y"))
+        return par, (t, y), np.concatenate(owner)
 
     def __repr__(self) -> str:
         return printable(

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from integrators.protocol import Array
-from problems.analysis import invariants
+from problems.analysis import deviations, invariants
 from problems.problem import System
 
 CLOSE = 2.0**-48  # relative difference up to which a sample's time may be that of an event
@@ -82,8 +82,5 @@ class Segments:
 
     def errors(self, system: System, t: Array, y: Array) -> dict[str, Array]:
         """Return how far they are from those at the start of the segment of each sample, shape (m,)."""
-        if self.t.size == 1:
-            return invariants.errors(system, self.par[0], y, t, start=(float(self.t[0]), self.y[0]))
-        places = self.places(t, y)
-        starts = self.t[places], self.y[places]
-        return invariants.errors_since(system, self.par[places].T, y, t, starts=starts)
+        starts, owner = (self.t, self.y), self.places(t, y)
+        return deviations.errors(system, self.par.T, y, t, starts=starts, owner=owner)

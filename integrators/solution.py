@@ -27,7 +27,7 @@ from integrators.plain import (
 from integrators.protocol import Array, DoubleDouble, MethodBase, Program, Stats, Status
 from integrators.refusals import as_numbers
 from integrators.segments import Segments
-from problems.analysis import invariants
+from problems.analysis import deviations, invariants
 from problems.bodies import Elements, elements
 from problems.checks import File, checked_arguments, readable
 from problems.double_double import DD
@@ -369,7 +369,7 @@ class Solution:
         return self._segments.invariants(self.problem.system, self.t, self.y)
 
     def errors(self) -> dict[str, Array]:
-        """Return the errors of the invariants along the trajectory, relative where that has a meaning.
+        """Return the errors of the invariants along the trajectory, see `problems.Problem.errors`.
 
         They are those of the integration: after an event that changes the state or the parameters
         (``Event(then=...)``) each invariant is compared with what it is right after that event, and not with
@@ -382,7 +382,7 @@ class Solution:
         if self.low is None or self.start is None:
             return self._segments.errors(problem.system, self.t[which], self.y[which])
         states, begin = DD(self.y[which], self.low[which]), (problem.t0, DD(*self.start.T))
-        return invariants.errors(problem.system, problem.par, states, self.t[which], start=begin)
+        return deviations.errors(problem.system, problem.par, states, self.t[which], starts=begin)
 
     @property
     def pairs(self) -> Array:

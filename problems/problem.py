@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from problems import emit
-from problems.analysis import invariants
+from problems.analysis import deviations, invariants
 from problems.checks import NOTHING, Named, checked_arguments
 from problems.errors import InputError, printable, shown
 from problems.systems.base import System, Value
@@ -253,10 +253,12 @@ class Problem:
         return invariants.invariants(self.system, self.par, y, t)
 
     def errors(self, y: ArrayLike, t: ArrayLike | None = None) -> dict[str, Array]:
-        """Return the deviation of each invariant from its initial value, relative to the size of that.
+        """Return the deviation of each invariant from its initial value, relative to the size of its terms.
 
-        The difference is computed in double-double, before rounding. Vectors are measured in the 2-norm. An
-        invariant that is initially 0 has an absolute error.
+        That size is the largest sum of the absolute values of its terms, such as kinetic and potential
+        energy, at the start and at the states given: it does not vanish where they cancel. Constants are not
+        counted. An invariant whose terms are all 0 has an absolute error. The difference is computed in
+        double-double, before rounding; vectors are measured in the 2-norm.
 
         Parameters
         ----------
@@ -267,7 +269,7 @@ class Problem:
         -------
         dict of str to ndarray, shape (n,)
         """
-        return invariants.errors(self.system, self.par, y, t, start=(self.t0, self.y0))
+        return deviations.errors(self.system, self.par, y, t, starts=(self.t0, self.y0))
 
     def guards(self, y: ArrayLike, t: ArrayLike | None = None) -> dict[str, Array]:
         """Return the symmetry guards, shape (n,) each; 0 as long as the symmetry is conserved."""

@@ -15,7 +15,7 @@ from hbvm_bench.reference.solutions import Reference
 from hbvm_bench.store.records import Compile, Counters, ErrorGrowth, Result, Timing
 from integrators.protocol import Status
 from problems import emit
-from problems.analysis import invariants
+from problems.analysis import deviations
 from problems.problem import Problem
 
 Array = NDArray[np.float64]
@@ -162,27 +162,16 @@ def _drift(problem: Problem, series: Series) -> Series:
 
 def _signed(problem: Problem, start: Array, t: Array, y: Array) -> Series:
     """Return the errors against the values at ``start``, the energy's with their sign, shape (n,) each."""
-    errors: Series = {}
-    states = np.ascontiguousarray(np.vstack([start[None], y]).T)
-    times = np.concatenate([[problem.t0], t])
-    for name, function in problem.system.invariants.items():
-        values = invariants.evaluate(function, times, states, problem.par)
-        gaps = np.stack([(v.hi[1:] - v.hi[0]) + (v.lo[1:] - v.lo[0]) for v in values])
-        size = float(np.linalg.norm([v.hi[0] for v in values])) or 1.0
-        errors[name] = (gaps[0] if name == "energy" else np.linalg.norm(gaps, axis=0)) / size
-    return errors
+    starts = problem.t0, start
+    errors = deviations.errors(problem.system, problem.par, y, t, starts=starts, signed=True)
+    return {name: values if name == "energy" else np.abs(values) for name, values in errors.items()}
 
 
 def _of_ensemble(problem: Problem, ensemble: Ensemble, series: Series) -> dict[str, Any]:
     """Return what differs of an ensemble: each trajectory's errors are against its own start."""
     starts, par = members(problem, ensemble)
-    errors: Series = {}
-    for name, function in problem.system.invariants.items():
-        before = invariants.evaluate(function, problem.t0, np.ascontiguousarray(starts.T), par.T)
-        after = invariants.evaluate(function, problem.t_end, np.ascontiguousarray(series["y"].T), par.T)
-        gaps = np.stack([(a - b).rounded() for a, b in zip(after, before, strict=True)])
-        size = np.linalg.norm(np.stack([b.hi for b in before]), axis=0)
-        errors[name] = np.linalg.norm(gaps, axis=0) / np.where(size == 0.0, 1.0, size)
+    begins, owner = (problem.t0, starts), np.arange(len(starts))
+    errors = deviations.errors(problem.system, par.T, series["y"], problem.t_end, starts=begins, owner=owner)
     if "witness.index" not in series:
         return {"errors": errors}
     high, low = series["witness.high"], series["witness.low"]

@@ -106,7 +106,7 @@ def find(key: str) -> Metric:
 
 @metric("energy error", "energy", "relative")
 def energy_max(m: Measured) -> float | str:
-    """Largest relative error of the energy over all samples, evaluated in double-double."""
+    """Largest error of the energy over all samples, relative to its terms, evaluated in double-double."""
     return _error_max(m, "energy")
 
 

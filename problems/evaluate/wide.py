@@ -65,11 +65,14 @@ def evaluate(function: Function, t: float, y: NDArray[np.float64], par: NDArray[
     return [values[0] for values in Evaluator(WIDE, t, y, par, 1).outputs(function)]
 
 
-def relative(now: list[Any], before: list[Any]) -> float:
-    """Return the distance of two vectors in the 2-norm, relative to the second if that is not 0."""
-    size = _WIDE.norm(before)
-    gap = _WIDE.norm([a - b for a, b in zip(now, before, strict=True)])
+def norm(values: list[Any]) -> Any:
+    """Return the 2-norm of numbers."""
+    return _WIDE.norm(values)
+
+
+def quotient(value: Any, size: Any) -> float:
+    """Return the nearest double of ``value/size``, of ``value`` where ``size`` is 0."""
     try:
-        return float(gap / size if size != 0 else gap)
+        return float(value / size if size != 0 else value)
     except OverflowError:
-        return math.inf
+        return math.inf if value > 0 else -math.inf

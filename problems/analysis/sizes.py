@@ -1,0 +1,103 @@
+"""How large the terms of a quantity are: the scale that its errors are relative to.
+
+A sum such as an energy may vanish while its terms do not: that of a pendulum that is released from the
+horizontal, or of a parabolic orbit. What rounding makes of it is a part of the terms, not of the sum.
+"""
+
+from collections.abc import Iterable
+from weakref import WeakKeyDictionary
+
+from problems.calculus.function import Function, Loops, LoopTerm, Term, stacked
+from problems.trace.graph import STATE, Node
+
+_known: WeakKeyDictionary[Function, Function] = WeakKeyDictionary()
+
+
+def with_sizes(function: Function) -> Function:
+    """Return a function with the outputs of another one, followed by the sum of absolute terms of each.
+
+    The terms are those of the sum as it is written, after factors that do not depend on the state are
+    multiplied in: of ``p**2/2 - par.g*m.cos(q)`` they are ``p**2/2`` and ``par.g*m.cos(q)``. A product of
+    two things that depend on the state is one term, and so is a function of a sum. What does not depend
+    on the state is none: a constant may be added to an energy at will.
+    """
+    if function not in _known:
+        sized = _Sizes(function.roots).known
+        outputs = tuple(
+            tuple(Term(node, term.key) for term in terms if (node := sized[term.node.id]) is not None)
+            for terms in function.outputs
+        )
+        loops: Loops = tuple(
+            (
+                loop,
+                tuple(
+                    LoopTerm(entry.index, node)
+                    for entry in entries
+                    if (node := sized[entry.node.id]) is not None
+                ),
+            )
+            for loop, entries in function.loops
+        )
+        sizes = Function(function.graph, outputs, loops)
+        _known[function] = stacked([function, sizes], function.name)
+    return _known[function]
+
+
+class _Sizes:
+    """The sums of absolute terms of nodes; ``None`` for those that have no terms.
+
+    No `problems.trace.fold.Fold`, which visits every node: what is inside a term is none of its business.
+    """
+
+    def __init__(self, roots: Iterable[Node]) -> None:
+        summands: dict[int, Node] = {}
+        stack = list(roots)
+        while stack:
+            node = stack.pop()
+            if node.id not in summands:
+                summands[node.id] = node
+                stack.extend(_summands(node))
+        self.known: dict[int, Node | None] = {}
+        for number in sorted(summands):  # arguments come first
+            self.known[number] = self._size(summands[number])
+
+    def _size(self, node: Node) -> Node | None:
+        if not node.flags & STATE:
+            return None
+        inside = [self.known[summand.id] for summand in _summands(node)]
+        match node.op:
+            case "add" | "sub":
+                first, *others = (size for size in inside if size is not None)
+                return first + others[0] if others else first
+            case "neg":
+                return inside[0]
+            case "mul" if inside and inside[0] is not None:
+                return _factor(node) * inside[0]
+            case "div" if inside and inside[0] is not None:
+                return inside[0] / abs(node.args[1])
+            case "sum" if inside[0] is not None:
+                return node.graph.sum(inside[0], node.data)
+            case "where" if inside:
+                zero = node.graph.const(0.0)
+                return node.graph.where(node.args[0], *(zero if size is None else size for size in inside))
+        return abs(node)
+
+
+def _summands(node: Node) -> tuple[Node, ...]:
+    """Return the parts of a node whose terms are its own."""
+    match node.op:
+        case "add" | "sub" | "neg" | "sum":
+            return node.args
+        case "mul" if len(moving := [arg for arg in node.args if arg.flags & STATE]) == 1:
+            return tuple(moving)
+        case "div" if not node.args[1].flags & STATE:
+            return node.args[:1]
+        case "where":
+            return node.args[1:]
+    return ()
+
+
+def _factor(node: Node) -> Node:
+    """Return the absolute value of the factor that does not depend on the state."""
+    (factor,) = (arg for arg in node.args if not arg.flags & STATE)
+    return abs(factor)
