@@ -447,6 +447,11 @@ class System:
             self._jacobians[function] = jacobian(self.function(function), name) if self.traced else None
         return self._jacobians[function]
 
+    @property
+    def sparsity(self) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
+        """Rows and columns of what is not zero in a Jacobian without a formula; ``None`` if not known."""
+        return None
+
     def tangent(
         self, name: str, directions: int, *, parameters: bool = False, beside: bool = False
     ) -> Function:

@@ -34,11 +34,14 @@ class Opaque(System):
         Length of the state.
     parameters, invariants, guards, name
         As for `VectorField`; invariants and guards are traced, and evaluated in double-double.
+    jac_sparsity : array_like or sparse matrix, shape (dim, dim), optional
+        Which entries of the Jacobian are not zero, as for SciPy's `solve_ivp`: differences of columns
+        without a common row are taken together, and matrices are factored sparse.
 
     Raises
     ------
     problems.errors.InputError
-        For a function with other arguments.
+        For a function with other arguments, or a ``jac_sparsity`` of another shape.
 
     Notes
     -----
@@ -70,10 +73,12 @@ class Opaque(System):
         invariants: Named[Callable[..., Any]] = NOTHING,
         guards: Named[Callable[..., Any]] = NOTHING,
         name: str | None = None,
+        jac_sparsity: Any = None,
     ) -> None:
         if not callable(f):
             raise InputError(f"f must be a function, not {shown(f)}.")
         super().__init__(f, dim, None, parameters, invariants, guards, name)
+        self._sparsity = None if jac_sparsity is None else _pattern(jac_sparsity, dim)
         self._take(f)
         self._trace_declared(invariants, guards)
 
@@ -84,11 +89,17 @@ class Opaque(System):
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state with the function itself, which pickle can keep and JSON cannot."""
-        return {**super().__getstate__(), "f": self.f}
+        return {**super().__getstate__(), "f": self.f, "sparsity": self._sparsity}
 
     def __setstate__(self, state: Mapping[str, Any]) -> None:
         super().__setstate__(state)
+        self._sparsity = state.get("sparsity")
         self._take(state["f"])
+
+    @property
+    def sparsity(self) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
+        """Rows and columns of what is not zero in the Jacobian; ``None`` if not known."""
+        return self._sparsity
 
     def __repr__(self) -> str:
         return f"Opaque({self.name}, dim={self.dim})"
@@ -138,6 +149,19 @@ class Opaque(System):
                 "one derivative for each component of y."
             )
         out[:] = array
+
+
+def _pattern(given: Any, dim: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    from scipy.sparse import csr_matrix, issparse
+
+    try:
+        matrix = csr_matrix(given if issparse(given) else np.asarray(given, dtype=np.float64))
+    except (TypeError, ValueError):
+        matrix = csr_matrix((0, 0))
+    if matrix.shape != (dim, dim):
+        raise InputError(f"jac_sparsity={shown(given)} must be a matrix of shape ({dim}, {dim}).")
+    rows, columns = matrix.nonzero()
+    return rows.astype(np.int64), columns.astype(np.int64)
 
 
 def _form(f: Callable[..., Any]) -> tuple[bool, bool]:

@@ -94,7 +94,7 @@ class Factors:
             return lambda x: lu_solve(factors, x, check_finite=False)
         from scipy.sparse.linalg import splu
 
-        return splu(self._pattern.matrix(entries)).solve
+        return splu(self._pattern.matrix(entries), permc_spec=self._pattern.order).solve
 
     def _solve(self, group: int) -> None:
         """Replace eight vectors, real parts and then imaginary parts, by what their matrices make of them."""
@@ -128,6 +128,9 @@ class _Pattern:
         self._indices = (positions % n).astype(np.int32)
         self._starts = np.searchsorted(positions, np.arange(n + 1) * n).astype(np.int32)
         self._n = n
+        # An ordering for A^T + A fills in half as much where the pattern is that of a symmetric matrix.
+        transposed = np.unique((positions % n) * n + positions // n)
+        self.order = "MMD_AT_PLUS_A" if np.array_equal(transposed, positions) else "COLAMD"
 
     def matrix(self, entries: Any) -> Any:
         """Return I plus the entries as a sparse matrix."""

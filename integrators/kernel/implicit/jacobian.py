@@ -16,7 +16,10 @@ POWERS = 6  # multiplications by the Jacobian that find its spectral radius to 2
 
 @compiled
 def differences(ctx, m, t):
-    """Set all entries, row by row, from differences: as many columns per call of the field."""
+    """Set all entries from differences: in each lane of a call of the field those of a group of columns.
+
+    The columns of a group have no row in common; see `integrators.kernel.implicit.groups`.
+    """
     rows = ctx.rows
     lanes, padded = ctx.lanes, ctx.padded
     times = m.trial
@@ -34,21 +37,25 @@ def differences(ctx, m, t):
     call_field(ctx.field, times, stages, par, values)
     for d in range(rows):
         m.slopes[d] = values[lanes * d]
-    for first in range(0, rows, lanes):
-        count = min(lanes, rows - first)
-        for l in range(count):
-            d = first + l
+    for first in range(0, m.group_count, lanes):
+        count = min(lanes, m.group_count - first)
+        for i in range(m.column_starts[first], m.column_starts[first + count]):
+            d = m.columns[i]
+            l = m.column_groups[d] - first
             size = max(abs(m.state[d]), SMALL * largest)
             if ctx.second == 0:
                 size = max(size, min(h * abs(m.slopes[d]), largest))
             moved = m.state[d] + STEP * (size if size > 0.0 else 1.0)
             stages[lanes * d + l] = moved
         call_field(ctx.field, times, stages, par, values)
-        for l in range(count):
-            d = first + l
+        for i in range(m.column_starts[first], m.column_starts[first + count]):
+            d = m.columns[i]
+            l = m.column_groups[d] - first
             width = stages[lanes * d + l] - m.state[d]
-            for r in range(rows):
-                m.entries[rows * r + d] = (values[lanes * r + l] - m.slopes[r]) / width
+            for j in range(m.entry_starts[i], m.entry_starts[i + 1]):
+                e = m.column_entries[j]
+                r = m.entry_rows[e]
+                m.entries[e] = (values[lanes * r + l] - m.slopes[r]) / width
             stages[lanes * d + l] = m.state[d]
 
 

@@ -34,6 +34,11 @@ class Corrections(Memory):
     pair_groups = Integer()  # of eight pairs of eigenvalues
     wide = Integer()  # doubles that such a group's vectors take, in all groups
     entry_count = Integer()
+    grouped = Integer()  # columns of the entries by differences; 0 where they are not
+    group_count = Integer()  # of columns, differences of which are taken together
+    group_ends = Integer()  # one more
+    column_ends = Integer()  # one more than columns
+    grouped_entries = Integer()
     factored = Integer()  # 1: the factors are those of the entries and of `factored_h`
     lu_size = Integer()
     lu_rows = Integer()
@@ -78,6 +83,11 @@ class Corrections(Memory):
     entry_rows = Table("entry_count", kind=int)
     entry_columns = Table("entry_count", kind=int)
     entries = Table("entry_count")
+    columns = Table("grouped", kind=int)  # group by group
+    column_groups = Table("grouped", kind=int)  # of each column
+    column_starts = Table("group_ends", kind=int)  # of each group in `columns`
+    column_entries = Table("grouped_entries", kind=int)  # column by column, as in `columns`
+    entry_starts = Table("column_ends", kind=int)  # of each of `columns` in `column_entries`
     state = Table("unknowns")  # where the Jacobian is taken
     lu = Array("lu_size")  # factors of eight matrices at a time; see `integrators.kernel.implicit.linear`
     pivots = Array("lu_rows", kind=int)

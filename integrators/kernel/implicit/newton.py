@@ -218,5 +218,5 @@ def solve_step(ctx, m, started):
     counters.iterations += m.tried
     counters.evaluations += m.tried * ctx.k
     if m.source == 0:
-        counters.evaluations += (m.jacobians - jacobians) * (1 + ctx.rows)
+        counters.evaluations += (m.jacobians - jacobians) * (1 + m.group_count)
     return outcome

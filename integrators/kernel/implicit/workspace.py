@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from integrators.kernel.context import Shape
 from integrators.kernel.implicit.constants import method, solver_of
 from integrators.kernel.implicit.factors import Factors
+from integrators.kernel.implicit.groups import Groups
 from integrators.kernel.implicit.memory import BLENDED, NEWTON, Corrections
 from integrators.kernel.native import binary, stages, store
 from integrators.kernel.native.field import BUILT_BY
@@ -37,15 +38,20 @@ class Linearization:
         Its entries; ``None`` where it is taken by differences.
     code : Native or None
         ``void(t, y, par, entries)``, all of them addresses.
+    pattern : tuple of ndarray, optional
+        Rows and columns of the entries that are not zero, where they are taken by differences and known.
     """
 
     jacobian: Jacobian | None
     code: binary.Native | None
+    pattern: tuple[Integers, Integers] | None = None
 
     def entry_indices(self, rows: int) -> tuple[Integers, Integers]:
         """Return the rows and the columns of the entries; by differences they are all of them."""
         if self.jacobian is not None:
             return self.jacobian.rows, self.jacobian.columns
+        if self.pattern is not None:
+            return self.pattern
         grid = np.indices((rows, rows)).reshape(2, -1)
         return grid[0], grid[1]
 
@@ -54,7 +60,7 @@ def linearization(system: System, *, second: bool) -> Linearization:
     """Compile the Jacobian of a system's field, or of its force, or load it."""
     jacobian = system.jacobian("force" if second else "field")
     if jacobian is None:
-        return Linearization(None, None)
+        return Linearization(None, None, system.sparsity)
     try:
         emit.compilable(system, jacobian)
     except InputError:  # differences take the field alone
@@ -120,6 +126,7 @@ class Workspace(Corrections):
         m = method(c.k, c.s, shape.second, c.lanes, solver_of(c.s, kind))
         unknowns = shape.rows // copies
         rows, columns = linearization.entry_indices(unknowns)
+        groups_of = Groups.of(rows, columns, unknowns) if linearization.code is None else Groups.none()
         pairs, whole = m.eigenvalues.size, c.s * unknowns
         padded = -(-shape.rows // 8) * 8 if padded is None else padded
         parts, groups, pair_groups = 2 if shape.second else 1, -(-c.s // 8), -(-pairs // 8)
@@ -136,7 +143,7 @@ class Workspace(Corrections):
             "method": solver_of(c.s, kind), "rows": shape.rows,
             "copies": copies, "unknowns": unknowns, "padded": padded,
             "k": c.k, "s": c.s, "dim": shape.dim, "entry_count": rows.size,
-            "parts": parts, "groups": groups, "block": 8 * groups * padded,
+            **groups_of.numbers, "parts": parts, "groups": groups, "block": 8 * groups * padded,
             "pair_groups": pair_groups, "wide": 16 * pair_groups * padded,
             "lu_rows": kept, "lu_size": 16 * kept * unknowns,
             "whole": whole, "whole_size": whole * -(-whole // 8) * 8,
@@ -152,7 +159,7 @@ class Workspace(Corrections):
             "left": packed(_in_eights(m.left)), "right": packed(_in_eights(m.right.T.conj()).T),
             "eigen": _in_eights(values), "powers": _in_eights(powers),
             "x": m.x, "derivatives": packed(m.x), "inverse": packed(m.eigenvalues[0].real * m.inverse),
-            "entry_rows": rows, "entry_columns": columns,
+            "entry_rows": rows, "entry_columns": columns, **groups_of.tables,
         }  # fmt: skip
         arrays = {name: np.ascontiguousarray(array) for name, array in tables.items()}
         super().__init__(numbers, arrays, {"source": linearization.code})
