@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from problems import limits
 from problems.errors import InputError, shown
 from problems.problem import System
+from problems.quantities import plain_numbers
 
 Array = NDArray[np.float64]
 
@@ -46,7 +47,7 @@ def check_times(times: ArrayLike, t: float) -> Array:
     problems.errors.InputError
         If the times are empty, not finite, not strictly monotone or behind ``t``.
     """
-    grid = as_numbers("times", times)
+    grid = plain_numbers("times", times)
     if grid.shape == (1,) and math.isfinite(grid.item()):
         return grid
     grid = grid if grid.ndim else grid[np.newaxis]
@@ -70,19 +71,11 @@ def check_times(times: ArrayLike, t: float) -> Array:
     )
 
 
-def as_numbers(label: str, value: ArrayLike) -> Array:
-    """Return an array of float64, or refuse what is not made of numbers."""
-    try:
-        return np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{label} must be numbers, not {shown(value)}.") from None
-
-
 def check_start(t0: Any) -> float:
     """Return the time of a start, a finite number, or refuse it."""
     if type(t0) is float and math.isfinite(t0):
         return t0
-    time = as_numbers("t0", t0)
+    time = plain_numbers("t0", t0)
     if time.ndim or not np.isfinite(time):
         raise InputError(f"t0={shown(t0)} must be one finite number.")
     return float(time)
@@ -98,7 +91,7 @@ def check_parameters(par: ArrayLike | None, system: System) -> Array:
     """
     if par is None:
         return system.pack()
-    values = as_numbers("par", par)
+    values = plain_numbers("par", par)
     if values.shape != (system.n_par,):
         raise InputError(f"par must have shape ({system.n_par},), not {values.shape}; see system.pack.")
     return values.copy()
@@ -112,7 +105,7 @@ def check_batch(Y0: ArrayLike, par: ArrayLike | None, times: Array, system: Syst
     problems.errors.InputError
         If they are of other shapes or not finite, or if n trajectories at so many times take too much memory.
     """
-    rows = np.atleast_2d(as_numbers("Y0", Y0))
+    rows = np.atleast_2d(plain_numbers("Y0", Y0))
     if rows.ndim != 2 or rows.shape[0] == 0:
         raise InputError(f"Y0 must have shape (n, {system.dim}) with n >= 1, not {rows.shape}.")
     n = rows.shape[0]
@@ -121,7 +114,7 @@ def check_batch(Y0: ArrayLike, par: ArrayLike | None, times: Array, system: Syst
         for row in rows:
             check_state(row, system.dim)
     starts = np.array(rows, order="C")
-    given = None if par is None else as_numbers("par", par)
+    given = None if par is None else plain_numbers("par", par)
     if given is None or given.ndim == 1:
         return starts, np.tile(check_parameters(given, system), (n, 1))
     if given.shape != (n, system.n_par):
@@ -139,7 +132,7 @@ def check_state(y0: ArrayLike, dim: int) -> Array:
     problems.errors.InputError
         If the shape is wrong or an entry is not finite.
     """
-    y = as_numbers("the initial state", y0).copy()
+    y = plain_numbers("the initial state", y0).copy()
     if y.shape != (dim,):
         raise InputError(f"the initial state must have shape ({dim},), not {y.shape}.")
     if not are_finite(y):

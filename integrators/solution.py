@@ -25,7 +25,6 @@ from integrators.plain import (
     unpacked_problem,
 )
 from integrators.protocol import Array, DoubleDouble, MethodBase, Program, Stats, Status
-from integrators.refusals import as_numbers
 from integrators.segments import Segments
 from problems.analysis import deviations, invariants
 from problems.bodies import Elements, elements
@@ -33,6 +32,7 @@ from problems.checks import File, checked_arguments, readable
 from problems.double_double import DD
 from problems.errors import InputError, MissingLibraryError, printable, shown
 from problems.problem import Problem
+from problems.quantities import plain_numbers
 
 FORMAT = 1  # of files
 ROUNDING = 1e-14  # relative to its largest size, how far a component may be from a sample that is met
@@ -224,7 +224,7 @@ class Solution:
 
     def _at(self, t: ArrayLike) -> Array:
         """Return the states at times with, where there are any, variations or low parts; shape (..., m)."""
-        times, dim = as_numbers("t", t), self.problem.system.dim
+        times, dim = plain_numbers("t", t), self.problem.system.dim
         before = self.t.size == 0 or self.t[0] != self.problem.t0
         at = np.concatenate([[self.problem.t0][: int(before)], self.t])
         states = np.concatenate([self.problem.y0[np.newaxis][: int(before)], self.y])

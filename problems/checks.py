@@ -40,6 +40,7 @@ from typing import (
 import numpy as np
 
 from problems.errors import InputError, shown, unknown
+from problems.quantities import refuse_more_than_numbers
 
 T = TypeVar("T")
 P = ParamSpec("P")
@@ -147,6 +148,8 @@ def checked(owner: str, name: str, value: Any, annotation: Any) -> Any:
             return condition.checked(owner, name, value)
     conditions = [condition for condition in conditions if isinstance(condition, Must)]
     words, read = _KINDS.get(kind, ("", lambda value: value))
+    if kind in (float, int, Sequence[float]) and not isinstance(value, bool):
+        refuse_more_than_numbers(f"{name}={shown(value)} of {owner}", value)
     result = read(value)
     if (words and result is None) or not all(must.holds(result) for must in conditions):
         # The narrowest condition is the one that is told.

@@ -14,6 +14,7 @@ from problems import emit
 from problems.analysis import deviations, invariants
 from problems.checks import NOTHING, Named, checked_arguments
 from problems.errors import InputError, printable, shown
+from problems.quantities import plain_numbers
 from problems.systems.base import System, Value
 
 Array = NDArray[np.float64]
@@ -310,11 +311,8 @@ def _listed(names: Sequence[str]) -> str:
     return ", ".join(names) if names else "nothing"
 
 
-def _numbers(label: str, value: ArrayLike | None, size: int | None) -> Array:
-    try:
-        array = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"{label} must be numbers, not {shown(value)}.") from error
+def _numbers(label: str, value: Any, size: int | None) -> Array:
+    array = np.array(plain_numbers(label, value))
     if array.ndim != 1 or (size is not None and array.size != size):
         wanted = "a flat list" if size is None else f"a flat list of length {size}"
         raise InputError(f"{label} must be {wanted}, not an array of shape {array.shape}.")

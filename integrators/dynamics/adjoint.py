@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from integrators import registry
 from integrators.dynamics.recorded import MEMORY, Recorded
 from integrators.protocol import Array, MethodBase, check_problem
-from integrators.refusals import as_numbers, check_times
+from integrators.refusals import check_times
 from integrators.running.integrate import prepared
 from integrators.running.variations import START, TIME, places
 from problems import emit
@@ -17,6 +17,7 @@ from problems.calculus.reverse import reverse
 from problems.checks import Must, checked_arguments
 from problems.errors import InputError, shown, unknown
 from problems.problem import Problem
+from problems.quantities import plain_numbers
 
 Bytes = Annotated[float, Must("a number of bytes above 0", lambda n: n > 0)]
 
@@ -147,7 +148,7 @@ def _samples(
     grid = check_times(times, problem.t0)
     if data is None:
         return grid, np.empty((grid.size, 0))
-    rows = as_numbers("data", data)
+    rows = plain_numbers("data", data)
     if rows.ndim not in (1, 2) or len(rows) != grid.size or not np.isfinite(rows).all():
         raise InputError(
             f"data must be finite numbers of shape ({grid.size},) or ({grid.size}, n), one row for each of "

@@ -16,13 +16,13 @@ from numpy.typing import ArrayLike
 from integrators import registry
 from integrators.dynamics.vectors import with_variations
 from integrators.protocol import Array, MethodBase, Status
-from integrators.refusals import as_numbers
 from integrators.running.variations import places
 from problems import emit
 from problems.analysis.structure import depends_on_time
 from problems.checks import Must, at_least, checked_arguments
 from problems.errors import InputError, shown, unknown
 from problems.problem import Problem, check_is_problem
+from problems.quantities import plain_numbers
 
 PERIOD = "period"
 CUT = 1e-10  # singular values below this part of the largest are those of directions along a family
@@ -143,7 +143,7 @@ def periodic(
     """
     check_is_problem(problem)
     method = registry.create("HBVM") if method is None else method
-    start = problem.y0 if guess is None else as_numbers("guess", guess)
+    start = problem.y0 if guess is None else plain_numbers("guess", guess)
     if start.shape != problem.y0.shape or not np.isfinite(start).all():
         raise InputError(f"guess={shown(guess)} must be {problem.system.dim} finite numbers.")
     span = abs(problem.t_end - problem.t0) if period is None else period
@@ -222,7 +222,7 @@ def continued(
     problem, orbits = orbit.problem, [orbit]
     index = _index(problem, along)
     free = tuple(name for name in orbit.free if name != along)
-    for value in np.atleast_1d(as_numbers("values", values)).tolist():
+    for value in np.atleast_1d(plain_numbers("values", values)).tolist():
         points = [np.concatenate([each.y0, each.problem.par, [each.period]]) for each in orbits[-2:]]
         before, last = points[0], points[-1]
         step = last[index] - before[index]
@@ -385,7 +385,7 @@ def _signs(problem: Problem, start: Array, mirror: ArrayLike | None) -> Array | 
     """Return the signs of a reflection; states near the guess tell whether it is a symmetry."""
     if mirror is None:
         return None
-    system, signs = problem.system, as_numbers("mirror", mirror)
+    system, signs = problem.system, plain_numbers("mirror", mirror)
     if signs.shape != start.shape or not (np.abs(signs) == 1.0).all():
         raise InputError(f"mirror={shown(mirror)} must be {system.dim} signs, 1 or -1.")
     if start[signs < 0].any():

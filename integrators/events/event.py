@@ -64,6 +64,10 @@ class Event(CheckedOptions):
     problems.errors.InputError
         For values outside these ranges.
 
+    Notes
+    -----
+    Attributes ``terminal`` and ``direction`` of ``g``, as SciPy's events have them, are taken over.
+
     Examples
     --------
     >>> from integrators import Event
@@ -87,7 +91,24 @@ class Event(CheckedOptions):
             raise InputError(f"an event needs a function g, not {shown(self.g)}.")
         if self.then is not None and not callable(self.then):
             raise InputError(f"then={shown(self.then)} of an event must be a function of the state.")
+        self._take_attributes()
         super().__post_init__()
+
+    def _take_attributes(self) -> None:
+        """Take ``g.terminal`` and ``g.direction``, as SciPy's events have them."""
+        for name, default in (("terminal", False), ("direction", 0)):
+            value = getattr(self.g, name, None)
+            if value is None:
+                continue
+            if name == "direction" and isinstance(value, float | int):
+                value = (value > 0) - (value < 0)
+            own = getattr(self, name)
+            if own != default and own != value:
+                raise InputError(
+                    f"the event's function has {name}={shown(value)} and the event {name}={shown(own)}; "
+                    "give one of them."
+                )
+            object.__setattr__(self, name, value)
 
     @property
     def last(self) -> int:

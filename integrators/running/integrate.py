@@ -33,7 +33,7 @@ from integrators.protocol import (
     offers,
     sampling_named,
 )
-from integrators.refusals import as_numbers, check_times
+from integrators.refusals import check_times
 from integrators.running.digits import check_digits, pairs
 from integrators.running.variations import follow
 from integrators.running.watch import SOON, Bar, Report, Watch, both, identity, read
@@ -42,6 +42,7 @@ from problems import limits
 from problems.checks import File, Must, Word, checked_arguments
 from problems.errors import InputError, shown
 from problems.problem import Problem, System
+from problems.quantities import plain_numbers
 from problems.systems.opaque import Opaque
 
 DEFAULT_SAMPLES = 1001
@@ -394,7 +395,7 @@ def _grid(problem: Problem, times: ArrayLike | None) -> Array:
     """Return the times to sample at: the user's, the problem's, or the default."""
     if times is None:
         times = problem.times
-    grid = as_numbers("times", problem.t_end if times is None else times)
+    grid = plain_numbers("times", problem.t_end if times is None else times)
     if grid.ndim == 0:
         if not isfinite(grid) or grid == problem.t0:
             raise InputError(

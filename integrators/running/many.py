@@ -26,7 +26,7 @@ from integrators.protocol import (
     sampling_named,
 )
 from integrators.reduce import Reducer, Reduction
-from integrators.refusals import as_numbers, check_batch, check_times
+from integrators.refusals import check_batch, check_times
 from integrators.running.integrate import SECONDS
 from integrators.running.pieces import (
     Gathered,
@@ -46,6 +46,7 @@ from integrators.running.watch import SOON, Bar, Progress, Report, Watch, identi
 from problems.checks import NOTHING, File, Named, Word, at_least, checked_arguments
 from problems.errors import InputError, shown, unknown
 from problems.problem import Problem
+from problems.quantities import plain_numbers
 from problems.systems.base import System
 
 FIRST = 64  # trajectories for each thread, of the first piece
@@ -277,7 +278,7 @@ def _check_together(
 
 def _times(problem: Problem, times: ArrayLike | None, n: int) -> Array:
     """Return the times of all, (m,), or those of each, (n, m), checked."""
-    given = as_numbers("times", [problem.t_end] if times is None else times)
+    given = plain_numbers("times", [problem.t_end] if times is None else times)
     if given.ndim != 2:
         return check_times(given, problem.t0)
     if len(given) != n:
@@ -310,7 +311,7 @@ def members(who: str, problem: Problem, starts: ArrayLike | None, parameters: An
     system = problem.system
     values = _values(system, parameters)
     first, n = _number(who, starts, values)
-    rows = as_numbers("starts", np.tile(problem.y0, (n, 1)) if starts is None else starts)
+    rows = plain_numbers("starts", np.tile(problem.y0, (n, 1)) if starts is None else starts)
     if rows.ndim != 2 or rows.shape[1] != system.dim or not n:
         raise InputError(f"starts must have shape (n, {system.dim}) with n >= 1, not {rows.shape}.")
     par = np.tile(problem.par, (n, 1))
@@ -357,7 +358,7 @@ def _values(system: System, parameters: Any) -> dict[str, Array]:
     for name, given in parameters.items():
         if name not in own:
             raise unknown(f"parameter of {system.name}", name, own)
-        value = as_numbers(f"values of parameter {name!r}", given)
+        value = plain_numbers(f"values of parameter {name!r}", given)
         shape = np.shape(own[name])
         if value.ndim not in (len(shape), len(shape) + 1) or value.shape[value.ndim - len(shape) :] != shape:
             wanted = f"(n, {shape[0]})" if shape else "(n,)"
@@ -371,7 +372,7 @@ def _values(system: System, parameters: Any) -> dict[str, Array]:
 def _number(who: str, starts: ArrayLike | None, values: dict[str, Array]) -> tuple[str, int]:
     """Return what says how many trajectories there are, in words, and how many."""
     if starts is not None:
-        return "starts", len(np.atleast_1d(as_numbers("starts", starts)))
+        return "starts", len(np.atleast_1d(plain_numbers("starts", starts)))
     counts = {name: len(value) for name, value in values.items() if value.ndim}
     if not counts:
         raise InputError(f"{who} needs starts=, an array (n, dim), or parameters= with n values.")

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from integrators.protocol import Array, MethodBase, Variations, offers
-from integrators.refusals import as_numbers
 from problems import emit
 from problems.errors import InputError, shown, unknown
 from problems.problem import Problem, System
+from problems.quantities import plain_numbers
 
 START, TIME = "y0", "t0"
 
@@ -72,7 +72,7 @@ def directions_of_each(problem: Problem, wanted: Any, starts: Array, par: Array)
         As `directions`, and for vectors of another number of trajectories.
     """
     system, count, names = problem.system, len(starts), _names(wanted)
-    if names is None and as_numbers("variations", wanted).ndim == 3:
+    if names is None and plain_numbers("variations", wanted).ndim == 3:
         vectors = _vectors(system, wanted, count)
         return vectors, np.zeros((count, system.n_par, vectors.shape[2]))
     state, parameters = directions(problem, wanted)
@@ -96,7 +96,7 @@ def _names(wanted: Any) -> list[str] | None:
 
 def _vectors(system: System, wanted: Any, *count: int) -> Array:
     """Return vectors that are given, of one trajectory, or of each of ``count``."""
-    vectors = as_numbers("variations", wanted)
+    vectors = plain_numbers("variations", wanted)
     shape = (*count, system.dim)
     if vectors.ndim != len(shape) + 1 or vectors.shape[:-1] != shape or vectors.shape[-1] == 0:
         whose = f" of {count[0]} trajectories" if count else ""

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from problems.checks import CheckedOptions
 from problems.errors import InputError, shown
+from problems.quantities import refuse_more_than_numbers
 
 Array = NDArray[np.float64]
 ROUNDING = 1e-14  # what rounding leaves of an e or a sine of inc that is 0: measured 2e-15
@@ -80,6 +81,7 @@ class Orbit(CheckedOptions):
         if len(anomalies) > 1:
             raise InputError(f"an Orbit takes one of f, M and T; got {' and '.join(anomalies)}.")
         for name, value in given.items():
+            refuse_more_than_numbers(f"{name} of Orbit", value)
             try:
                 array = np.array(value, dtype=np.float64)
             except (TypeError, ValueError):

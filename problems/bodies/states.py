@@ -18,6 +18,7 @@ from problems.bodies.orbits import (
 from problems.checks import checked_arguments
 from problems.errors import InputError, shown
 from problems.problem import Problem, check_is_problem
+from problems.quantities import refuse_more_than_numbers
 from problems.systems.base import System
 
 Array = NDArray[np.float64]
@@ -225,6 +226,7 @@ def _constant(problem: Problem) -> float:
 
 def masses_of(masses: ArrayLike) -> Array:
     """Return a copy of masses that are checked."""
+    refuse_more_than_numbers("masses", masses)
     try:
         values = np.array(masses, dtype=np.float64)
     except (TypeError, ValueError):
@@ -239,6 +241,7 @@ def masses_of(masses: ArrayLike) -> Array:
 
 def rows_of(label: str, rows: ArrayLike, n: int) -> Array:
     """Return a copy of three numbers for each of n bodies, which are checked."""
+    refuse_more_than_numbers(label, rows)
     try:
         values = np.array(rows, dtype=np.float64)
     except (TypeError, ValueError):

@@ -18,6 +18,7 @@ from problems.calculus.jacobian import Jacobian, jacobian
 from problems.calculus.reverse import Variables, reverse
 from problems.checks import NOTHING, Named, checked, number, numbers
 from problems.errors import InputError, shown, unknown
+from problems.quantities import refuse_more_than_numbers
 from problems.systems.stored import check_system
 from problems.trace import arguments
 from problems.trace.graph import Graph, Node, T
@@ -565,6 +566,7 @@ def _layout(parameters: Mapping[str, Value]) -> tuple[dict[str, tuple[int, tuple
 def _parameter(name: str, value: Any) -> Value:
     if not name.isidentifier() or name.startswith("__"):
         raise InputError(f"the parameter name {name!r} must be an identifier, such as 'mass'.")
+    refuse_more_than_numbers(f"parameter {name!r}", value)
     result = number(value)
     result = _nested(value) if result is None else result
     if result is None or np.size(result) == 0:

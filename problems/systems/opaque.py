@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 from problems.calculus.function import Function
 from problems.checks import NOTHING, Named, at_least, checked_arguments
 from problems.errors import InputError, shown
+from problems.quantities import plain_numbers
 from problems.systems.base import System, Value
 
 Array = NDArray[np.float64]
 
+_UNWRITTEN = np.array(0x7FF8_0000_5EED_0001).view(np.float64)  # a NaN that no arithmetic makes
 UNDEFINED = (ArithmeticError, ValueError)  # 1/0, math.sqrt(-1): not a number, as in compiled code
 
 
@@ -132,23 +134,37 @@ class Opaque(System):
         arguments = (t, y, par) if self.takes_parameters else (t, y)
         try:
             if self.in_place:
-                out[:] = np.nan
-                self.f(*arguments, out)
-                return
+                out[:] = _UNWRITTEN
+                arguments += (out,)
             value = self.f(*arguments)
         except UNDEFINED:
             out[:] = np.nan
             return
-        try:
-            array = np.asarray(value, dtype=np.float64)
-        except (TypeError, ValueError, OverflowError) as error:
-            raise InputError(f"{self.name} returns {shown(value)}, not {self.dim} numbers.") from error
+        if self.in_place:
+            self._check_written(out, value)
+            return
+        array = plain_numbers(f"what {self.name} returns", value)
         if array.shape != (self.dim,):
             raise InputError(
                 f"{self.name} returns an array of shape {array.shape}, not ({self.dim},): "
                 "one derivative for each component of y."
             )
         out[:] = array
+
+    def _check_written(self, out: Array, value: Any) -> None:
+        """Refuse a result of which components were not written: they are not the field's own NaN."""
+        missing = out.view(np.int64) == _UNWRITTEN.view(np.int64)
+        if not missing.any():
+            return
+        if value is not None:
+            raise InputError(
+                f"{self.name} returns {shown(value)}, though it takes a third argument, which is the array "
+                "for the derivative; write to that, or give a constant as a parameter, f(t, y, par)."
+            )
+        raise InputError(
+            f"{self.name} has not written dy[{int(missing.argmax())}]; a function f(t, y, dy) writes all "
+            f"{self.dim} derivatives, as in dy[:] = ..."
+        )
 
 
 def _pattern(given: Any, dim: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

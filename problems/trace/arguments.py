@@ -2,6 +2,7 @@
 
 import inspect
 import math
+import numbers
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, NoReturn
 
@@ -371,7 +372,13 @@ def call(
             named[parameter.name] = value
     graph.limit = int(min(limits.limit("OPERATIONS"), 2**62))
     try:
-        return function(*arguments, **named)
+        result = function(*arguments, **named)
+        if not _same(result, function(*arguments, **named)):
+            raise InputError(
+                f"{line_of_function(function)}: {label} is another formula when it is called again; draw "
+                "random numbers and count before, and give the values as parameters."
+            )
+        return result
     except InputError:
         raise
     except NameError as error:
@@ -392,6 +399,19 @@ def call(
         raise InputError(f"{line}: {label} failed with {type(error).__name__}: {error}") from error
     finally:
         graph.limit = None
+
+
+def _same(first: Any, second: Any) -> bool:
+    """Whether two calls returned the same formulas: equal operations are one node."""
+    if isinstance(first, Node) or isinstance(second, Node):
+        return first is second
+    if is_list(first) and is_list(second):
+        return len(first) == len(second) and all(map(_same, first, second))
+    if isinstance(first, Mapping) and isinstance(second, Mapping):
+        return first.keys() == second.keys() and all(_same(first[key], second[key]) for key in first)
+    if isinstance(first, numbers.Real) and isinstance(second, numbers.Real):
+        return first == second or (first != first and second != second)
+    return type(first) is type(second)
 
 
 def scalar(value: Any, *, graph: Graph, function: Callable[..., Any], label: str) -> Node:

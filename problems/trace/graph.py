@@ -454,6 +454,11 @@ class Graph:
             if not math.isfinite(number):
                 refuse(f"the constant {value!r} is not finite", "use finite numbers only")
             return self.const(number)
+        if isinstance(value, complex):
+            refuse(
+                f"this calculates with the complex number {value!r}, and states are real",
+                "split it into real and imaginary parts, y[0] + i*y[1]",
+            )
         return refuse(
             f"this calculates with {_described(value)} as if it were one number",
             "write the formula in components, such as q[0]*p[1] - q[1]*p[0]",

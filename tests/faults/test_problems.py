@@ -20,7 +20,7 @@ load('kepler', e=huge)                                       | e=about 1e400 of 
 load('kepler', e=True)                                       | e=True of kepler must be an eccentricity, 0
 load('kepler', e=[.6])                                       | e=[0.6] of kepler must be an eccentricity, 0
 load('kepler', e=np.array([.6, .7]))                         | e=[0.6, 0.7] of kepler must be an
-load('kepler', e=1j)                                         | e=1j of kepler must be an eccentricity, 0 <=
+load('kepler', e=1j)                                         | e=1j of kepler is complex, and must be real; a
 load('kepler', t_end=0)                                      | t_end=0 must differ from t0=0.0
 load('kepler', t_end='100')                                  | t_end='100' of kepler must be a finite number
 load('kepler', t_end=nan)                                    | t_end=nan of kepler must be a finite number
@@ -232,7 +232,7 @@ Hamiltonian(lambda q: q, dof=1)                              | H returns 1 value
 Hamiltonian(lambda q: nan, dof=1)                            | H returns nan, which is not a number
 Hamiltonian(lambda q: q[0]*nan, dof=1)                       | the constant nan is not finite; use finite
 Hamiltonian(lambda q: q[0]*huge, dof=1)                      | H failed with OverflowError: int too large to
-Hamiltonian(lambda q: q[0]*1j, dof=1)                        | this calculates with 1j as if it were one
+Hamiltonian(lambda q: q[0]*1j, dof=1)                        | this calculates with the complex number 1j,
 Hamiltonian(lambda q: q[0]+True, dof=1)                      | this calculates with True as if it were one
 Hamiltonian(lambda q: q[0]**q[0], dof=1)                     | a symbol stands in an exponent; for x >= 0
 Hamiltonian(lambda q: q[0]**0.3, dof=1)                      | the exponent 0.3 is not an integer or half an
@@ -278,11 +278,11 @@ Hamiltonian(osc, dof=1, parameters={'k': 'a'})               | parameter 'k' is 
 Hamiltonian(osc, dof=1, parameters={'k': None})              | parameter 'k' is None; give one finite number
 Hamiltonian(osc, dof=1, parameters={'k': nan})               | parameter 'k' is nan; give one finite number
 Hamiltonian(osc, dof=1, parameters={'k': huge})              | parameter 'k' is about 1e400; give one finite
-Hamiltonian(osc, dof=1, parameters={'k': [[1, 2], [3, 4]]})  | parameter 'k' is [[1, 2], [3, 4]]; give one
+Hamiltonian(osc, dof=1, parameters={'k': [[1, 2], [3]]})     | parameter 'k' is [[1, 2], [3]]; give one
 Hamiltonian(osc, dof=1, parameters={'k': [[1, 2], [3]]})     | parameter 'k' is [[1, 2], [3]]; give one
 Hamiltonian(osc, dof=1, parameters={'k': '2'})               | parameter 'k' is '2'; give one finite number
 Hamiltonian(osc, dof=1, parameters={'k': []})                | parameter 'k' is []; give one finite number
-Hamiltonian(osc, dof=1, parameters={'k': 1j})                | parameter 'k' is 1j; give one finite number
+Hamiltonian(osc, dof=1, parameters={'k': 1j})                | parameter 'k' is complex, and must be real; a
 Hamiltonian(osc, dof=1, parameters={3: 1.0})                 | parameters={3: 1.0} of Hamiltonian must be a
 Hamiltonian(osc, dof=1, parameters={'my k': 1.0})            | the parameter name 'my k' must be an
 Hamiltonian(osc, dof=1, parameters=[1, 2])                   | parameters=[1, 2] of Hamiltonian must be a
@@ -320,7 +320,7 @@ VectorField(lambda y: [y[1], 'a'], dim=2)                    | f's component 1 r
 VectorField(lambda y: [y[1], [y[0]]], dim=2)                 | f's component 1 returns 1 values, not one
 VectorField(lambda y: (y[i] for i in range(2)), dim=2)       | f returns one value, not a list of dim=2;
 VectorField(lambda y: np.array([y[1], y[0]]), dim=2)         | this makes a numpy array of symbols; write
-VectorField(lambda y: {0: y[1], 1: y[0]}, dim=2)             | f returns 2 values, not a list of dim=2;
+VectorField(lambda y: {0: y[1], 1: y[0]}, dim=2)             | f returns one value, not a list of dim=2;
 VectorField(lambda q: [q[0], q[1]], dim=2)                   | f asks for an argument 'q'; name those it
 VectorField(lambda y: [y[1], -y[0]], dim=0)                  | dim=0 of VectorField must be a whole number
 VectorField(lambda y: [y[1], -y[0]], dim='2')                | dim='2' of VectorField must be a whole number
@@ -329,7 +329,7 @@ VectorField(lambda y: [y[1], -y[0]], dim=10**9)              | HBVM_BENCH_MAX_CO
 VectorField(lambda y: [y[i] for i in range(100000)], dim=100000) | HBVM_BENCH_MAX_OPERATIONS
 VectorField(lambda y: [y[1], -y[0]])                         | VectorField needs dim; give a value as in
 VectorField(lambda y: [y[1], -y[0]], dof=2)                  | unknown argument of VectorField 'dof'; did
-VectorField(lambda y: 'ab', dim=2)                           | f returns 2 values, not a list of dim=2;
+VectorField(lambda y: 'ab', dim=2)                           | f returns one value, not a list of dim=2;
 VectorField(3, dim=2)                                        | f must be a function, not 3
 Poisson(osc, dim=3)                                          | Poisson needs B; give a value as in
 Poisson(lambda y: y[0]**2, lambda y: [[0, 1], [1, 0]], dim=2) | B is not skew-symmetric as it is written:
@@ -374,7 +374,7 @@ Problem(H1, q0=['a'], p0=[1], t_end=1.)                      | q0 must be number
 Problem(H1, q0=[nan], p0=[1], t_end=1.)                      | q0 must be finite, not [nan]
 Problem(H1, q0=[inf], p0=[1], t_end=1.)                      | q0 must be finite, not [inf]
 Problem(H1, q0=[huge], p0=[1], t_end=1.)                     | q0 must be numbers, not
-Problem(H1, q0=[1j], p0=[1], t_end=1.)                       | q0 must be numbers, not [1j]
+Problem(H1, q0=[1j], p0=[1], t_end=1.)                       | q0 is complex, and must be real; a complex
 Problem(H1, q0=[None], p0=[1], t_end=1.)                     | q0 must be finite, not [nan]
 Problem(H1, q0={}, p0=[1], t_end=1.)                         | q0 must be numbers, not {}
 Problem(H1, q0=[[0]], p0=[1], t_end=1.)                      | q0 must be a flat list of length 1, not an
@@ -394,7 +394,7 @@ Problem(V2, y0=[0, 1], t_end='1')                            | t_end='1' of Prob
 Problem(V2, y0=[0, 1], t_end=1., references=[1])             | references=[1] of Problem must be a list of
 emit.numba(P1, 'field')                                      | a system is needed, such as problem.system
 Hamiltonian(osc, dof=1, parameters={'m': [1]}, bodies=Bodies()) | does not fit dof=1 and m=(1.0,)
-Problem(V2, y0=[0, 1], t_end=1j)                             | t_end=1j of Problem must be a finite number
+Problem(V2, y0=[0, 1], t_end=1j)                             | t_end=1j of Problem is complex, and must be
 Problem(V2, y0=[0, 1], t0='a', t_end=1.)                     | t0='a' of Problem must be a finite number
 Problem(V2, y0=[0, 1], t0=None, t_end=1.)                    | t0=None of Problem must be a finite number
 Problem(V2, y0=[0, 1], t0=1., t_end=1.)                      | t_end=1.0 must differ from t0=1.0

@@ -51,7 +51,7 @@ def test_what_is_right_is_kept_in_the_form_in_which_it_is_compared(annotation, g
         (float, NAN, "x=nan of f must be a finite number."),
         (float, 10**400, "x=about 1e400 of f must be a finite number."),
         (float, np.ones(1), "must be a finite number."),
-        (float, 1j, "must be a finite number."),
+        (float, 1j, "is complex, and must be real; a complex state"),
         (float, None, "x=None of f must be a finite number."),
         (Positive, 0, "x=0 of f must be a positive number."),
         (Positive, INF, "x=inf of f must be a positive number."),

@@ -21,9 +21,9 @@ from integrators.options import Count, Stages, Step
 from integrators.plugins.scipy.field import Field, field, recognised
 from integrators.plugins.scipy.native import NativeSteps
 from integrators.plugins.scipy.python import PythonSteps
-from integrators.refusals import as_numbers
 from problems.checks import Positive, checked
 from problems.errors import InputError, shown
+from problems.quantities import plain_numbers
 
 __all__ = ["HBVM", "Field", "Gauss", "field"]
 
@@ -147,7 +147,7 @@ class HBVM(OdeSolver):
 
     def _tolerate(self, rtol: Any, atol: Any) -> None:
         """Keep the tolerances, each a number or an array, or refuse them."""
-        relative, self.atol = as_numbers("rtol", rtol), as_numbers("atol", atol)
+        relative, self.atol = plain_numbers("rtol", rtol), plain_numbers("atol", atol)
         if np.any(relative < SMALLEST_RTOL):
             warnings.warn(
                 f"At least one element of rtol={rtol!r} is too small: {SMALLEST_RTOL:.3g} takes its place.",
