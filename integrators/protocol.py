@@ -144,10 +144,11 @@ class Status(StrEnum):
     MAX_STEPS = "max_steps"
     USER_ERROR = "user_error"
     INTERRUPTED = "interrupted"
+    INACCURATE = "inaccurate"
 
     @property
     def failed(self) -> bool:
-        """Whether the integration ended before the requested time."""
+        """Whether the integration ended before the requested time, or what it found is known to be wrong."""
         return self not in _NO_FAILURES
 
 

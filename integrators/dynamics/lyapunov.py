@@ -2,21 +2,24 @@
 
 The vectors follow the steps of the trajectory and are made orthonormal again and again, ``V = Q R``; the
 logarithms of the diagonal of R, added up, grow like the exponents (G. Benettin, L. Galgani, A. Giorgilli,
-J.-M. Strelcyn, Meccanica 15 (1980), 9-20 and 21-30). The next round of steps is as long as the growth in the
+J.-M. Strelcyn, Meccanica 15 (1980), 9-20 and 21-30). All of that is compiled
+(`integrators.kernel.tangent.rounds`): the next round of steps is as long as the growth in the
 last one allows; where the vectors grew too differently all the same, the rounds since a checkpoint are
-repeated with fewer steps each. The mean square of a few cosine transforms of the growth
+repeated with fewer steps each. Adaptive steps are also as short as the vectors' own errors require: a step
+may be accurate for the trajectory and many times as long as a contracting vector takes to decay.
+The mean square of a few cosine transforms of the growth
 is the variance of its average times the time, where the time is long (E. Lazarus, D. J. Lewis, J. H. Stock,
 M. W. Watson, J. Business and Economic Statistics 36 (2018), 541-559): Student's distribution then gives an
 interval.
 """
 
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 
 from integrators import registry
-from integrators.dynamics.divergence import mean_divergence
+from integrators.dynamics.divergence import Divergence
 from integrators.dynamics.vectors import with_variations
 from integrators.protocol import Array, MethodBase, Status
 from problems.checks import at_least, checked_arguments
@@ -29,16 +32,8 @@ INTERVALS = 2048  # of equal length, at whose ends at least the vectors are made
 # made the intervals of Lorenz' exponent, T = 200, 1.8 times as long as they should be, over 32 parts 4 times.
 WAVES = 8
 STUDENT = 2.3060  # the 97.5 % quantile of Student's distribution with WAVES degrees of freedom
-# Logarithms of the ratio of the longest vector to the shortest after a round. The relative error of the
-# shortest is the rounding unit times this ratio.
-AIM = np.log(1e5)  # what a round's number of steps is chosen for,
-LIMIT = np.log(1e9)  # and above which it is repeated
-RANGE = 25.0  # the logarithm of a length itself may be so many times as large: doubles end at exp(709)
-FIRST = 16  # steps of the first round
-LONGER = 4  # times as many steps in the next round, at most
-ROOM = 1 << 24  # bytes of the vectors of a round's steps, at most
 MOST_DIGITS = 12  # after the decimal point, where exponents are printed
-REPEATED = 64  # rounds from one checkpoint to the next, at most: one takes the time of a short round
+UNCERTAIN = 1e-6  # part of the exponents by which their sum may differ from the mean divergence anyway
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,11 +51,10 @@ class Exponents:
         length, which is itself a small multiple of it there.
     sum : float
         Of the exponents; with all of them, the mean divergence of the field.
-    divergence : float or None
-        That mean along the trajectory, computed without the vectors: exact where it is constant, else the
-        integral of a further component by the quadrature of the same steps, taken once more, so that it is
-        the sum to the local error of the vectors. ``None`` where not all exponents are asked for, for
-        systems so large that the Jacobian is not written down, and where the repeated steps fail.
+    divergence : float
+        That mean along the trajectory: exact where it is constant; else, with all exponents, its integral by
+        the quadrature of the same steps, so that it is the sum to the local error of the vectors; with fewer,
+        the mean over up to 2048 steps' ends, whose scatter it has.
     pairs : float or None
         The largest sum of two exponents that are each other's negative, for all exponents of a canonical
         system: with `Gauss` this is rounding.
@@ -71,19 +65,28 @@ class Exponents:
     steps : int
         Number of steps, repeated ones included.
     status, reason
-        How the integration ended; after a failure, the averages are those up to there.
+        How the integration ended; after a failure, the averages are those up to there. ``INACCURATE``: with
+        all exponents, sum and mean divergence differ by more than the intervals explain, as where fixed
+        steps are too long for a contracting direction.
     """
 
     exponents: Array
     intervals: Array
     sum: float
-    divergence: float | None
+    divergence: float
     pairs: float | None
     time: float
     rounds: int
     steps: int
     status: Status
     reason: str
+    all: bool
+    """Whether there is one for each component of the state."""
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What makes the exponents doubtful, as sentences."""
+        return (self.reason,) if self.status is Status.INACCURATE else ()
 
     def __str__(self) -> str:
         """Return the exponents with their intervals, and what must hold of them, one a line."""
@@ -96,12 +99,9 @@ class Exponents:
             if low <= 0.0 <= high:
                 line += f"  0 is not excluded; zero exponents vanish like (log T)/T = {bound:.1e}"
             lines.append(line)
-        line = f"sum {self.sum:.13g}"
-        if self.divergence is not None:
-            line += (
-                f", mean divergence along the trajectory {self.divergence:.13g}: difference "
-                f"{abs(self.sum - self.divergence):.0e}"
-            )
+        line = f"sum {self.sum:.13g}, mean divergence along the trajectory {self.divergence:.13g}"
+        if self.all:
+            line += f": difference {abs(self.sum - self.divergence):.0e}"
         lines.append(line)
         if self.pairs is not None:
             lines.append(f"pairs of opposite sign: to {self.pairs:.0e}")
@@ -134,6 +134,11 @@ def lyapunov(
     skip : float
         Initial transient that is excluded.
 
+    Returns
+    -------
+    Exponents
+        After Ctrl-C, with the status ``INTERRUPTED``, the averages up to there, where there are any.
+
     Raises
     ------
     problems.errors.InputError
@@ -151,7 +156,8 @@ def lyapunov(
     """
     check_is_problem(problem)
     method = registry.create("HBVM") if method is None else method
-    return exponents_of(problem, method, *checked_span(problem, count, t_end, skip), skip)
+    n, end = checked_span(problem, count, t_end, skip)
+    return exponents_of(problem, method, n, end, skip, interruptible=True)
 
 
 class NoAveragesError(InputError):
@@ -189,125 +195,64 @@ def checked_span(problem: Problem, count: int | None, t_end: float | None, skip:
     return n, end
 
 
-def exponents_of(problem: Problem, method: MethodBase, n: int, end: float, skip: float) -> Exponents:
+def exponents_of(
+    problem: Problem, method: MethodBase, n: int, end: float, skip: float, *, interruptible: bool = False
+) -> Exponents:
     """Return the exponents of a trajectory, of arguments that `checked_span` has checked.
+
+    Parameters
+    ----------
+    interruptible : bool
+        Whether Ctrl-C is to return what was computed until then.
 
     Raises
     ------
     problems.errors.InputError
         For a method without variations; a `NoAveragesError` where there is too little of the trajectory.
     """
-    system, start, marks = problem.system, problem.t0 + skip, _marks(problem, end)
-    stepper = with_variations(problem, method)
-    course = _Rounds(stepper, _frame(system.dim, system.dof)[:, :n], np.zeros((system.n_par, n)))
-    status, reason = course.through(marks)
-    counted, steps = np.isfinite(course.times), stepper.stats.steps
-    times, growth = course.times[counted], course.growth[counted]
+    system, start = problem.system, problem.t0 + skip
+    whole, known = n == system.dim, Divergence(problem)
+    stepper, frame = with_variations(problem, method), _frame(system.dim, system.dof)[:, :n]
+    course = stepper.frames(frame, _marks(problem, end), divergence=whole and known.constant is None)
+    broken: KeyboardInterrupt | None = None
+    try:
+        status, reason = course.go_on()
+    except KeyboardInterrupt as raised:
+        if not interruptible:
+            raise
+        broken, status, reason = raised, Status.INTERRUPTED, f"interrupted at t = {stepper.t!r}."
+    counted, steps = np.isfinite(course.ends), stepper.stats.steps
+    times, growth = course.ends[counted], course.growth[counted]
     if np.count_nonzero(times >= start) <= 2 * WAVES:
+        if broken is not None:
+            raise broken
         why = reason or "give a later t_end or shorter steps."
         text = f"there are too few steps after skip={skip!r} for intervals: {why}"
         raise NoAveragesError(text, status if status.failed else Status.NOT_FINITE, steps)
-    canonical = system.dof is not None and n == system.dim
+    canonical = whole and system.dof is not None
     exponents, intervals, pairs, time = _averaged(start, times, growth, canonical)
-    divergence = None
-    if n == system.dim:
-        begin = float(times[np.searchsorted(times, start)])
-        again = with_variations(problem, method)
-        divergence = mean_divergence(problem, again, begin, float(times[-1]), marks)
+    first = int(np.searchsorted(times, start))
+    if whole and known.constant is None:
+        divergence = float(course.divergence[counted][first + 1 :].sum()) / time
+    else:
+        divergence = known.mean(times[first:], course.states[counted][first:])
+    total = float(exponents.sum())
+    if whole and not status.failed:
+        explained = float(np.diff(intervals).min()) / 2.0 + UNCERTAIN * float(np.abs(exponents).sum())
+        if not abs(total - divergence) <= explained:
+            status = Status.INACCURATE
+            reason = (
+                f"the sum of the exponents, {total:.6g}, is not the mean divergence, {divergence:.6g}, as it "
+                "must be: the steps are too long for vectors that contract fast; take shorter steps."
+            )
     return Exponents(
-        exponents, intervals, float(exponents.sum()), divergence, pairs, time, course.rounds, steps, status,
-        reason,
-    )  # fmt: skip
+        exponents, intervals, total, divergence, pairs, time, course.rounds, steps, status, reason, whole
+    )
 
 
 def _marks(problem: Problem, end: float) -> Array:
     """Return the ends of the intervals."""
     return np.linspace(problem.t0, end, INTERVALS + 1)[1:]
-
-
-class _Rounds:
-    """A frame that follows a trajectory and is made orthonormal after each round of steps.
-
-    Attributes
-    ----------
-    times : ndarray, shape (m,)
-        The end of the last step in each of m intervals; NaN where there is none.
-    growth : ndarray, shape (m, n)
-        The logarithms of the diagonal of R, added up in each of them.
-    rounds : int
-        How many there were.
-    """
-
-    def __init__(self, stepper: Any, frame: Array, none: Array):
-        self._stepper, self._none, self._room = stepper, none, max(1, ROOM // frame.nbytes)
-        self._n, self.rounds = frame.shape[1], 0
-        stepper.follow(frame, none)
-
-    def through(self, marks: Array) -> tuple[Status, str]:
-        """Take rounds up to the last of some times, none beyond the next of them; return how it ended.
-
-        Raises
-        ------
-        problems.errors.InputError
-            If the vectors grow too differently in a single step.
-        """
-        stepper, i, steps = self._stepper, 0, min(FIRST, self._room)
-        self.times, self.growth = np.full(marks.size, np.nan), np.zeros((marks.size, self._n))
-        most, passed = self._room, -np.inf  # steps of a round before a time where one was too long
-        saved, apart = self._saved(i), REPEATED
-        while i < marks.size:
-            if stepper.t > passed:
-                most = self._room
-            if self.rounds >= saved[1] + apart:
-                saved, apart = self._saved(i), min(2 * apart, REPEATED)
-            asked = min(steps, most)
-            samples = stepper.march(float(marks[i]), asked)
-            if samples.status is not Status.FINISHED:
-                return samples.status, samples.reason
-            taken = samples.t.size
-            if taken:
-                frame, sizes, extent = _factors(stepper.variations[-1])
-                if not extent <= LIMIT:
-                    if taken == 1:
-                        where = f"in the step to t = {stepper.t!r}"
-                        raise NoAveragesError(
-                            f"{where} vectors grow too differently; take shorter steps.",
-                            Status.NOT_FINITE,
-                            stepper.stats.steps,
-                        )
-                    most, passed = min(most, taken // 2), max(passed, stepper.t)
-                    # where rounds are often repeated, the rounds since the last checkpoint cost more than it
-                    i, apart = self._back_to(saved), max(apart // 4, 1)
-                    continue
-                stepper.follow(frame, self._none)
-                self.times[i] = stepper.t
-                self.growth[i] += sizes
-                self.rounds += 1
-                steps = int(min(max(taken * AIM / max(extent, 1e-9), 1.0), LONGER * steps, self._room))
-            if taken < asked:
-                i += 1
-        return Status.FINISHED, ""
-
-    def _saved(self, i: int) -> tuple[Any, int, int, float, Array]:
-        """Return what `_back_to` needs, in the interval with number i."""
-        return self._stepper.checkpoint(), self.rounds, i, float(self.times[i]), self.growth[i].copy()
-
-    def _back_to(self, saved: tuple[Any, int, int, float, Array]) -> int:
-        """Go back, and return the number of the interval."""
-        checkpoint, self.rounds, i, time, growth = saved
-        self._stepper.restore(checkpoint)
-        self.times[i:], self.growth[i:] = np.nan, 0.0
-        self.times[i], self.growth[i] = time, growth
-        return i
-
-
-def _factors(vectors: Array) -> tuple[Array, Array, float]:
-    """Return Q, the logarithms of the diagonal of R, and how large they and their differences are."""
-    with np.errstate(all="ignore"):  # vectors that have left the range of doubles are found by the result
-        frame, triangle = np.linalg.qr(vectors)
-        sizes = np.log(np.abs(np.diag(triangle)))
-        extent = max(float(np.ptp(sizes)), float(np.abs(sizes).max()) / RANGE)
-    return frame, sizes, extent
 
 
 def _frame(dim: int, dof: int | None) -> Array:

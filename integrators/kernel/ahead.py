@@ -3,7 +3,18 @@
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 
-from integrators.kernel.engines import follow, line, look, pull, record, run, run_own, solver, steps
+from integrators.kernel.engines import (
+    follow,
+    line,
+    look,
+    orthonormal,
+    pull,
+    record,
+    run,
+    run_own,
+    solver,
+    steps,
+)
 from integrators.kernel.native import lowered
 
 ENGINES = {
@@ -14,6 +25,7 @@ ENGINES = {
     "ensembles with adaptive steps": run_own,
     "events": look,
     "variations": follow,
+    "exponents": orthonormal,
     "recorded steps": record,
     "adjoints": pull,
 }

@@ -22,6 +22,9 @@ look = Engine("events.entry", "entry", "ctx search")
 follow = Engine("tangent.entry", "entry", "operation ctx memory")
 """``follow(what, ctx, tangents)``: see `integrators.kernel.tangent.entry`; the steps call its address."""
 
+orthonormal = Engine("tangent.rounds", "entry", "frame")
+"""``orthonormal(frame)``: see `integrators.kernel.tangent.rounds`."""
+
 record = Engine("adjoint.entry", "record", "event ctx tape")
 """``record(event, ctx, tape)``: see `integrators.kernel.adjoint.entry`; the steps call its address."""
 

@@ -41,6 +41,7 @@ from integrators.kernel.parts.implicit import ALWAYS_IMPLICIT, AUTO, FOR_VECTORS
 from integrators.kernel.searches import LastingSearch
 from integrators.kernel.spare import Pair, Spare
 from integrators.kernel.tables import Constants
+from integrators.kernel.tangent.frames import Frames
 from integrators.kernel.tangent.group import Directions
 from integrators.kernel.tangent.vectors import Vectors
 from integrators.protocol import SAMPLINGS, Array, Samples, Stats, Status, UserError, sampling_named
@@ -247,6 +248,12 @@ class HBVMStepper(ABC):
     @abstractmethod
     def march(self, end: float, most: int) -> Samples:
         """Take steps, ``most`` at most and none beyond the time ``end``; return them."""
+
+    @one_thread
+    def frames(self, frame: Array, marks: Array, *, divergence: bool) -> Frames:
+        """Let an orthonormal frame follow the trajectory up to some times; see `Frames`."""
+        self.follow(frame, np.zeros((self._program.system.n_par, frame.shape[1])))
+        return Frames(self, frame, marks, divergence=divergence)
 
     def scale(self, factors: ArrayLike) -> None:
         """Multiply the vectors by numbers; see `integrators.protocol.Variations`."""
@@ -571,12 +578,7 @@ class HBVMStepper(ABC):
         targets: int = 0, parts: int = 0, /,
     ) -> int:  # fmt: skip
         """Call the kernel once; put the implicit solver to work where it is wanted."""
-        if self._wants_solver:
-            if self._context.implicit.wanted == FOR_VECTORS:
-                self._make_implicit()
-                self._context.implicit.wanted = NOT_WANTED
-            else:
-                self._take_implicit()
+        self._provide_solver()
         with self._pace:
             outcome = self._enter(
                 steps.prepared(
@@ -585,6 +587,15 @@ class HBVMStepper(ABC):
                 )
             )  # fmt: skip
         return self._handled(outcome)
+
+    def _provide_solver(self) -> None:
+        """Put the implicit solver to work where it is wanted."""
+        if self._wants_solver:
+            if self._context.implicit.wanted == FOR_VECTORS:
+                self._make_implicit()
+                self._context.implicit.wanted = NOT_WANTED
+            else:
+                self._take_implicit()
 
     def _enter(self, call: Callable[[], int]) -> int:
         """Return how the kernel came back."""

@@ -234,7 +234,10 @@ def _caller(arguments: int, returns: Any = types.void) -> Any:
     def four(typing, function, a, b, c, d):
         return returns(types.int64, a, b, c, d), generate
 
-    return intrinsic({2: two, 3: three, 4: four}[arguments])
+    def eleven(typing, function, a, b, c, d, e, f, g, h, i, j, k):
+        return returns(types.int64, a, b, c, d, e, f, g, h, i, j, k), generate
+
+    return intrinsic({2: two, 3: three, 4: four, 11: eleven}[arguments])
 
 
 call_field = _caller(4)
@@ -251,5 +254,7 @@ call_follow = _caller(3, types.int64)
 """``call_follow(follow, what, ctx, memory)``: vectors along a trajectory, `integrators.kernel.tangent`."""
 call_factors = _caller(2, types.int64)
 """``call_factors(factors, what, which)``: whoever keeps the factors of large matrices."""
+call_entry = _caller(11, types.int64)
+"""``call_entry(entry, operation, ctx, ...)``: steps of a trajectory, see `integrators.kernel.step.entry`."""
 call_steps = _caller(2)
 """``call_steps(code, group, count)``: steps of a group of trajectories, see `integrators.kernel.ensemble`."""

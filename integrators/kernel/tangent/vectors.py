@@ -94,6 +94,11 @@ class Vectors:
                 self.solvers.append(workspace)
 
     @property
+    def memory(self) -> Tangents:
+        """What compiled code knows of them."""
+        return self._memory
+
+    @property
     def iterations(self) -> int:
         """Iterations of all groups, own and partial steps."""
         return sum(
