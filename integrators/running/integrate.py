@@ -39,6 +39,7 @@ from integrators.running.variations import follow
 from integrators.running.watch import SOON, Bar, Report, Watch, both, identity, read
 from integrators.solution import Solution, solution_of
 from problems import limits
+from problems.analysis.tables import check_tables
 from problems.checks import File, Must, Word, checked_arguments
 from problems.errors import InputError, shown
 from problems.problem import Problem, System
@@ -156,6 +157,7 @@ def integrate(
     grid = _grid(problem, times)
     wanted = wanted_events(events, sample)
     end = float(check_times(grid, problem.t0)[-1]) if grid.size or wanted else problem.t0
+    check_tables(problem.system, problem.par, problem.t0, end)
     acting = bool(wanted) and any(event.then is not None for event in wanted.values())
     if acting and variations is not None:
         raise InputError("variations do not go on past an event with then=; leave out one of them.")

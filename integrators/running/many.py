@@ -43,6 +43,7 @@ from integrators.running.pieces import (
 from integrators.running.variations import check as check_vectors
 from integrators.running.variations import directions_of_each
 from integrators.running.watch import SOON, Bar, Progress, Report, Watch, identity, read
+from problems.analysis.tables import check_tables
 from problems.checks import NOTHING, File, Named, Word, at_least, checked_arguments
 from problems.errors import InputError, shown, unknown
 from problems.problem import Problem
@@ -173,6 +174,8 @@ def integrate_many(
     system = problem.system
     rows, par = members("integrate_many", problem, starts, parameters)
     n, grid = len(rows), _times(problem, times, len(rows))
+    for end in {float(np.nanmin(grid)), float(np.nanmax(grid))}:
+        check_tables(problem.system, problem.par, problem.t0, end)
     kept = min(grid.shape[-1], 1) if reduce else grid.shape[-1]
     check_batch(rows, par, np.empty(kept), system)
     looked_for = named(events) if not isinstance(events, Sequence) or events else {}

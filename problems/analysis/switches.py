@@ -75,6 +75,11 @@ class Switches:
         return np.unique(times[np.isfinite(times)]) + 0.0  # no negative zero
 
 
+def affine_pieces(node: Node, par: NDArray[np.float64]) -> Pieces | None:
+    """Return a node's affine pieces as a function of time; ``None`` where it is not made of a few."""
+    return _Evaluation(par).of(node)
+
+
 class _Evaluation(Fold[Pieces | None]):
     """The affine pieces of nodes, with given parameters; ``None`` where they are not made of a few."""
 

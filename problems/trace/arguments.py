@@ -257,8 +257,11 @@ class Mathematics:
             )
         return condition.choose(a, b)
 
-    def table(self, x: Any, xs: Any, ys: Any) -> Node:
-        """Return the cubic spline through points, at ``x``; as SciPy's ``CubicSpline(xs, ys)``."""
+    def table(self, x: Any, xs: Any, ys: Any, *, extrapolate: bool = False) -> Node:
+        """Return the cubic spline through points, at ``x``; as SciPy's ``CubicSpline(xs, ys)``.
+
+        An integration beyond the points of a table of the time is refused, unless ``extrapolate``.
+        """
         from scipy.interpolate import CubicSpline  # for those who have tables
 
         try:
@@ -271,8 +274,9 @@ class Mathematics:
                 f"m.table cannot use these points ({error})",
                 "give as many finite ys as ascending xs, flat lists",
             )
+        rows = tuple(map(tuple, spline.c.T.tolist()))
         return self._graph.table(
-            self._graph.node(x), Table(tuple(spline.x.tolist()), tuple(map(tuple, spline.c.T.tolist())))
+            self._graph.node(x), Table(tuple(spline.x.tolist()), rows, bool(extrapolate))
         )
 
     def __getattr__(self, name: str) -> Callable[[Any], Node]:

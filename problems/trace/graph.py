@@ -60,17 +60,20 @@ class Table:
         Ascending, n >= 2.
     rows : tuple of tuple of float
         The n - 1 pieces' coefficients in powers of ``x - knots[i]``, highest first.
+    extrapolate : bool
+        Whether arguments beyond the ends are asked for, see `problems.analysis.tables`.
     """
 
     knots: tuple[float, ...]
     rows: tuple[tuple[float, ...], ...]
+    extrapolate: bool = False
 
     def slope(self) -> "Table":
         """Return the derivative."""
         rows = tuple(
             tuple((len(row) - 1 - i) * c for i, c in enumerate(row[:-1])) or (0.0,) for row in self.rows
         )
-        return Table(self.knots, rows)
+        return Table(self.knots, rows, self.extrapolate)
 
     def at(self, x: Any) -> Any:
         """Return the value at a number or an array of any kind, of doubles or of more digits."""

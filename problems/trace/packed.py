@@ -76,7 +76,9 @@ _OF_PLAIN: dict[str, Callable[[Any, Graph], Any]] = {
     "sum": lambda data, graph: graph.loops[data],
     "entry": lambda data, graph: (graph.constants(np.array(data[0], dtype=np.float64)), _affine(data[1])),
     "element": lambda data, graph: (_stage(data[0], graph), _place(data[1])),
-    "table": lambda data, _: Table(tuple(map(float, data[0])), tuple(tuple(map(float, r)) for r in data[1])),
+    "table": lambda data, _: Table(
+        tuple(map(float, data[0])), tuple(tuple(map(float, r)) for r in data[1]), len(data) == 3
+    ),
 }
 """What `Node.data` is, from what `_plain` returns."""
 
@@ -86,7 +88,8 @@ def _plain(data: Any) -> Any:
         case Loop():
             return data.id
         case Table():
-            return [list(data.knots), [list(row) for row in data.rows]]
+            plain: list[Any] = [list(data.knots), [list(row) for row in data.rows]]
+            return [*plain, True] if data.extrapolate else plain
         case Affine():
             return [list(data.coefficients), data.offset]
         case Constants():

@@ -271,7 +271,8 @@ def _rows(plain: Any) -> NDArray[np.int64]:
 
 
 def _check_table(plain: Any) -> None:
-    knots, rows = items(plain, "a table", 2)
+    parts = items(plain, "a table")
+    knots, rows = items(parts[:-1] if parts[2:] == [True] else parts, "a table", 2)
     places = [_number(knot, "a knot of a table") for knot in items(knots, "the knots of a table")]
     if len(places) < 2 or any(a >= b for a, b in pairwise(places)):
         refuse("the knots of a table do not ascend")

@@ -15,7 +15,7 @@ from scipy.interpolate import CubicSpline
 from scipy.special import erf, erfc
 
 import problems
-from integrators import DOP853, HBVM, Gauss, Taylor, integrate
+from integrators import DOP853, HBVM, Gauss, Taylor, integrate, integrate_many
 from problems import Hamiltonian, InputError, Problem, VectorField, emit
 from problems.analysis import latex, structure
 from problems.analysis.switches import Switches
@@ -383,6 +383,50 @@ class TestTables:
     def test_other_points_are_refused(self, xs, ys):
         with pytest.raises(InputError, match=r"m\.table cannot use these points"):
             Hamiltonian(lambda q, p, m: p[0] ** 2 / 2 + m.table(q[0], xs, ys), dof=1)
+
+
+class TestTablesBeyondTheirData:
+    TIMES, VALUES = [0.0, 1.0, 2.0, 3.0, 10.0], [0.0, 1.0, 0.0, -1.0, 0.0]
+
+    def forced(self, argument=lambda t: t, **options):
+        system = VectorField(
+            lambda t, y, m: [m.table(argument(t), self.TIMES, self.VALUES, **options)], dim=1
+        )
+        return Problem(system, y0=[0.0], t_end=10.0)
+
+    @pytest.mark.parametrize("end", [10.5, -1.0, 100.0])
+    def test_it_is_refused_before_the_run(self, end):
+        for run in (
+            lambda: integrate(self.forced(), HBVM(), [end]),
+            lambda: integrate(self.forced(), DOP853(rtol=1e-8, atol=1e-8), [end]),
+            lambda: integrate_many(self.forced(), HBVM(), starts=[[0.0]], times=[end]),
+        ):
+            with pytest.raises(InputError, match=r"data from 0.0 to 10.0.*extrapolate=True"):
+                run()
+
+    def test_within_the_data_it_is_not(self):
+        assert integrate(self.forced(), HBVM(), [10.0]).status == "finished"
+        assert integrate(self.forced(lambda t: t / 3), HBVM(), [30.0]).status == "finished"
+
+    def test_on_request_the_outer_pieces_go_on(self):
+        problem = self.forced(extrapolate=True)
+        again = pickle.loads(pickle.dumps(problem))
+        solution = integrate(again, HBVM(), [11.0])
+        exact = float(CubicSpline(self.TIMES, self.VALUES).antiderivative()(11.0))
+        assert solution.y[-1, 0] == pytest.approx(exact, rel=1e-13)
+
+    @pytest.mark.parametrize("seed", range(20))
+    def test_random_arguments(self, seed):
+        rng = np.random.default_rng(seed)
+        slope, offset = rng.uniform(0.2, 2.0) * rng.choice([-1, 1]), rng.uniform(0.0, 10.0)
+        end = float(rng.uniform(1.0, 10.0))
+        inside = 0.0 <= slope * end + offset <= 10.0
+        problem = self.forced(lambda t: slope * t + offset)
+        if inside:
+            assert integrate(problem, HBVM(), [end]).status == "finished"
+        else:
+            with pytest.raises(InputError, match="extrapolate=True"):
+                integrate(problem, HBVM(), [end])
 
 
 class TestWhere:
