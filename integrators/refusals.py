@@ -66,9 +66,21 @@ def check_times(times: ArrayLike, t: float) -> Array:
     if not np.isfinite(grid).all():
         raise InputError("times must be finite numbers.")
     raise InputError(
-        f"times must be strictly monotone and ahead of the present time {t!r}; "
-        f"got {float(grid[0])!r} ... {float(grid[-1])!r}."
+        f"times must be strictly monotone and ahead of the present time {t!r}; {_out_of_order(grid, t)}."
     )
+
+
+def _out_of_order(grid: Array, t: float) -> str:
+    """Return which of the times are not in order, and what to do."""
+    low, high = float(grid.min()), float(grid.max())
+    if low < t < high:
+        return f"{low!r} and {high!r} lie on both sides of it: integrate twice, forwards and backwards"
+    steps = np.diff(grid)
+    wrong = np.flatnonzero(~(steps > 0.0) if high > t else ~(steps < 0.0))
+    if not wrong.size:
+        return f"{float(grid[0])!r} is behind it"
+    i = int(wrong[0])
+    return f"times[{i}] = {float(grid[i])!r} is followed by times[{i + 1}] = {float(grid[i + 1])!r}"
 
 
 def check_start(t0: Any) -> float:

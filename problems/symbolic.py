@@ -91,6 +91,12 @@ def from_sympy(
             raise InputError(
                 f"the equations of this {type(expression).__name__} are not formed; call its {formed} first."
             ) from error
+        if len(right) > len(state):
+            raise InputError(
+                f"the equations of this {type(expression).__name__} have {len(right)} unknowns for "
+                f"{len(state)} coordinates and velocities: the last {len(right) - len(state)} are Lagrange "
+                "multipliers of its constraints; choose coordinates that are independent."
+            )
         places: dict[Any, Callable[..., Any]] = {x: _component("y", i) for i, x in enumerate(state)}
         formulas = [_Formula(sympy, e, places, names, times) for e in right]
         return VectorField(

@@ -333,6 +333,11 @@ def call(
     """
     if not callable(function):
         raise InputError(f"{label} must be a function, not {shown(function)}.")
+    if hasattr(function, "py_func"):
+        raise InputError(
+            f"{label} is compiled by numba, and formulas are traced; give its plain function, "
+            f"{getattr(function, '__name__', 'f')}.py_func, or a compiled right-hand side as problems.Opaque."
+        )
     offered: dict[str, Callable[[], Any]] = {
         "t": lambda: graph.symbol("t", 0, flags=T),
         "y": lambda: Vector(graph, "y", "y", 0, dim),
@@ -400,6 +405,11 @@ def call(
         ) from error
     except Exception as error:
         line = line_of_traceback(error.__traceback__) or line_of_function(function)
+        if type(error).__module__.partition(".")[0] == "numba":
+            raise InputError(
+                f"{line_of_function(function)}: {label} calls a function that numba has compiled, and "
+                "formulas are traced; call its plain function, as in f.py_func(q, p)."
+            ) from error
         raise InputError(f"{line}: {label} failed with {type(error).__name__}: {error}") from error
     finally:
         graph.limit = None
