@@ -9,6 +9,7 @@ from problems.errors import InputError, MissingLibraryError, shown
 from problems.systems.base import System
 from problems.systems.hamiltonian import Hamiltonian
 from problems.systems.vector_field import VectorField
+from problems.trace.graph import Node
 
 FUNCTIONS = {
     "sin": "sin", "cos": "cos", "tan": "tan", "exp": "exp", "log": "log", "Abs": "abs", "sinh": "sinh",
@@ -35,7 +36,8 @@ def from_sympy(
     ----------
     expression : sympy.Expr, or a LagrangesMethod or KanesMethod
         A Hamiltonian in the symbols ``q`` and ``p``; or a system of `sympy.physics.mechanics` whose equations
-        have been formed. Their mass matrix is inverted symbolically, by ``rhs()``.
+        have been formed. The system with their ``mass_matrix_full`` and ``forcing_full``
+        is solved by elimination, once, in formulas.
     q, p : sympy.Symbol, or sequence of them
         Positions and momenta, for a Hamiltonian.
     parameters : mapping of Symbol to float, optional
@@ -78,10 +80,10 @@ def from_sympy(
             raise InputError(f"the parameter {text!r} must be named as a variable is; rename the symbol.")
     times = {sympy.Symbol("t") if t is None else t}
     defaults = {text: float(values[symbol]) for symbol, text in names.items()}
-    if hasattr(expression, "rhs") and hasattr(expression, "u"):
+    if hasattr(expression, "mass_matrix_full") and hasattr(expression, "u"):
         state = [*expression.q, *expression.u]
         try:
-            right = [sympy.sympify(component) for component in expression.rhs()]
+            matrix, forcing = expression.mass_matrix_full, expression.forcing_full
         except ValueError as error:
             formed = (
                 "form_lagranges_equations()"
@@ -98,11 +100,16 @@ def from_sympy(
                 "multipliers of its constraints; choose coordinates that are independent."
             )
         places: dict[Any, Callable[..., Any]] = {x: _component("y", i) for i, x in enumerate(state)}
-        formulas = [_Formula(sympy, e, places, names, times) for e in right]
-        return VectorField(
-            lambda t, y, par, m: [f({"t": t, "y": y, "par": par, "m": m}) for f in formulas],
-            dim=len(state), parameters=defaults, name=name,
-        )  # fmt: skip
+        rows = [
+            [_Formula(sympy, sympy.sympify(e), places, names, times) for e in [*matrix.row(i), forcing[i]]]
+            for i in range(matrix.rows)
+        ]
+
+        def field(t, y, par, m):
+            given = {"t": t, "y": y, "par": par, "m": m}
+            return solution([[entry(given) for entry in row] for row in rows])[: len(state)]
+
+        return VectorField(field, dim=len(state), parameters=defaults, name=name)
     if not isinstance(expression, sympy.Expr) or not q or len(q) != len(p):
         raise InputError(
             f"{shown(expression)} needs as many q as p, and must be an expression of SymPy; or give a "
@@ -119,6 +126,44 @@ def from_sympy(
 
     timeless = not any(time in expression.free_symbols for time in times)
     return Hamiltonian(at_rest if timeless else H, dof=len(q), parameters=defaults, name=name)
+
+
+def solution(rows: list[list[Any]]) -> list[Any]:
+    """Return the solution of a linear system of formulas; the last column is the right-hand side.
+
+    Rows are exchanged only where a pivot is 0 whatever the state is: a mass matrix needs no exchange.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If the matrix is singular as it is written.
+    """
+    n, rows = len(rows), [list(row) for row in rows]
+    for k in range(n):
+        pivot = next((i for i in range(k, n) if not _is_zero(rows[i][k])), None)
+        if pivot is None:
+            raise InputError("the mass matrix is singular as it is written; each speed needs a mass.")
+        rows[k], rows[pivot] = rows[pivot], rows[k]
+        for row in rows[k + 1 :]:
+            if _is_zero(row[k]):
+                continue
+            factor = row[k] / rows[k][k]
+            for j in range(k + 1, n + 1):
+                if not _is_zero(rows[k][j]):
+                    row[j] = row[j] - factor * rows[k][j]
+    values: list[Any] = [0.0] * n
+    for k in reversed(range(n)):
+        total = rows[k][n]
+        for j in range(k + 1, n):
+            if not _is_zero(rows[k][j]) and not _is_zero(values[j]):
+                total = total - rows[k][j] * values[j]
+        values[k] = total / rows[k][k]
+    return values
+
+
+def _is_zero(value: Any) -> bool:
+    number = value.data if isinstance(value, Node) and value.op == "const" else value
+    return isinstance(number, int | float) and number == 0
 
 
 def _component(vector: str, i: int) -> Callable[..., Any]:

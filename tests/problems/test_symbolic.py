@@ -5,6 +5,7 @@ import pytest
 
 from integrators import HBVM, integrate
 from problems import Hamiltonian, InputError, Problem, VectorField, emit, from_sympy
+from problems.symbolic import solution
 
 sympy = pytest.importorskip("sympy")
 q1, q2, p1, p2, a, t = sympy.symbols("q1 q2 p1 p2 a t")
@@ -99,3 +100,52 @@ def test_lagranges_equations():
 def test_what_is_no_system(arguments, words):
     with pytest.raises(InputError, match=words):
         from_sympy(*arguments)
+
+
+def links(n):
+    """Return a pendulum of n links on a cart by Kane's method, and its parameters."""
+    import sympy
+    from sympy.physics import mechanics
+
+    q, u = mechanics.dynamicsymbols(f"q:{n + 1}"), mechanics.dynamicsymbols(f"u:{n + 1}")
+    masses, lengths = sympy.symbols(f"m:{n + 1}"), sympy.symbols(f"l:{n}")
+    g, t = sympy.symbols("g t")
+    frame, origin = mechanics.ReferenceFrame("I"), mechanics.Point("O")
+    origin.set_vel(frame, 0)
+    point = origin.locatenew("P0", q[0] * frame.x)
+    point.set_vel(frame, u[0] * frame.x)
+    particles = [mechanics.Particle("cart", point, masses[0])]
+    forces, kinematic = [(point, -masses[0] * g * frame.y)], [q[0].diff(t) - u[0]]
+    for i in range(n):
+        link = frame.orientnew(f"B{i}", "Axis", [q[i + 1], frame.z])
+        link.set_ang_vel(frame, u[i + 1] * frame.z)
+        following = point.locatenew(f"P{i + 1}", lengths[i] * link.x)
+        following.v2pt_theory(point, frame, link)
+        point = following
+        particles.append(mechanics.Particle(f"mass{i}", point, masses[i + 1]))
+        forces.append((point, -masses[i + 1] * g * frame.y))
+        kinematic.append(q[i + 1].diff(t) - u[i + 1])
+    method = mechanics.KanesMethod(frame, q_ind=q, u_ind=u, kd_eqs=kinematic)
+    method.kanes_equations(particles, forces)
+    return method, {g: 9.81, **dict.fromkeys(masses, 1.0), **dict.fromkeys(lengths, 0.5)}
+
+
+@pytest.mark.parametrize("n", [2, 5])
+def test_a_chain_of_links_has_the_field_that_its_mass_matrix_gives(n):
+    sympy = pytest.importorskip("sympy")
+    method, parameters = links(n)
+    system = from_sympy(method, parameters=parameters)
+    symbols = [*method.q, *method.u, *parameters]
+    both = sympy.lambdify(symbols, [method.mass_matrix_full, method.forcing_full], "numpy", cse=True)
+    for seed in range(5):
+        y = np.random.default_rng(seed).normal(size=2 * n + 2)
+        matrix, forcing = both(*y, *parameters.values())
+        expected = np.linalg.solve(matrix, forcing).ravel()
+        value = emit.numpy(system, "field")(0.0, y, system.pack())
+        assert value == pytest.approx(expected, rel=1e-11, abs=1e-11)  # measured 3e-14
+
+
+def test_a_linear_system_of_formulas_is_solved_where_a_pivot_is_zero():
+    assert solution([[0.0, 2.0, 4.0], [3.0, 1.0, 5.0]]) == [1.0, 2.0]
+    with pytest.raises(InputError, match="singular"):
+        solution([[0.0, 1.0, 1.0], [0.0, 2.0, 1.0]])
