@@ -205,19 +205,32 @@ class Node:
 
     def __pow__(self, exponent: Any) -> "Node":
         if isinstance(exponent, Node):
-            refuse("a symbol stands in an exponent", "for x >= 0 write x**y as m.exp(y*m.log(x))")
+            return self._real_power(exponent)
         if not isinstance(exponent, numbers.Real) or isinstance(exponent, bool):
             refuse(f"the exponent {exponent!r} is not a number", "give an integer or half an integer")
         twice = 2 * float(exponent)
         if not twice.is_integer() or abs(twice) > 2000:
-            refuse(
-                f"the exponent {exponent!r} is not an integer or half an integer (up to 1000)",
-                "for x >= 0 write x**a as m.exp(a*m.log(x))",
-            )
+            return self._real_power(self.graph.node(exponent))
         return self.graph.power(self, int(twice))
 
-    def __rpow__(self, base: Any) -> NoReturn:
-        refuse("a symbol stands in an exponent", "for a > 0 write a**x as m.exp(x*m.log(a))")
+    def __rpow__(self, base: Any) -> "Node":
+        return self.graph.node(base)._real_power(self)
+
+    def _real_power(self, exponent: "Node") -> "Node":
+        """Return the power of a positive number."""
+        return self.graph.call("exp", exponent * self.graph.call("log", self))
+
+    def __mod__(self, period: Any) -> "Node":
+        return self - period * (self // period)
+
+    def __rmod__(self, number: Any) -> "Node":
+        return self.graph.node(number) % self
+
+    def __floordiv__(self, divisor: Any) -> "Node":
+        return self.graph.call("floor", self / divisor)
+
+    def __rfloordiv__(self, number: Any) -> "Node":
+        return self.graph.node(number) // self
 
     # What a traced function cannot do. Comparisons refuse by themselves: `==` falling
     # back to identity would take one branch in silence.
@@ -250,14 +263,6 @@ class Node:
         )
 
     __float__ = __int__ = __complex__ = __index__ = __round__ = __trunc__ = __floor__ = __ceil__ = _number
-
-    def _whole(self, *_: Any) -> NoReturn:
-        refuse(
-            "this takes // or % of a symbol",
-            "write x // y as m.floor(x/y), and x % y as x - y*m.floor(x/y)",
-        )
-
-    __floordiv__ = __rfloordiv__ = __mod__ = __rmod__ = __divmod__ = __rdivmod__ = _whole
 
     def __array__(self, *_: Any, **__: Any) -> NoReturn:
         refuse(

@@ -488,3 +488,25 @@ def test_the_examples_of_the_page_are_true():
     result = doctest.testfile(str(PAGE), module_relative=False)
     assert result.attempted >= 12
     assert result.failed == 0
+
+
+@pytest.mark.parametrize(
+    ("formula", "plain"),
+    [
+        (lambda x: x**0.3, lambda x: x**0.3),
+        (lambda x: x**-1.7, lambda x: x**-1.7),
+        (lambda x: 2**x, lambda x: 2**x),
+        (lambda x: x**x, lambda x: x**x),
+        (lambda x: x % 0.7, lambda x: x % 0.7),
+        (lambda x: 7.53 % x, lambda x: 7.53 % x),
+        (lambda x: x // 0.7, lambda x: x // 0.7),
+    ],
+)
+def test_python_operators_have_the_value_that_they_have_for_numbers(formula, plain):
+    system = problems.VectorField(lambda y: [formula(y[0])], dim=1, name="operators")
+    field = emit.numpy(system, "field")
+    for x in (0.1, 0.65, 1.0, 3.2, 12.9):
+        assert field(0.0, np.array([x]), system.pack())[0] == pytest.approx(plain(x), rel=4e-15, abs=4e-15)
+    slope = emit.numpy(system, system.tangent("field", 1))(0.0, np.array([1.0, 3.2]), system.pack())[0]
+    around = (plain(3.2 + 1e-6) - plain(3.2 - 1e-6)) / 2e-6
+    assert slope == pytest.approx(around, rel=1e-8, abs=1e-8)  # measured 1e-9

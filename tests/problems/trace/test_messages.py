@@ -119,22 +119,6 @@ def outside(q, p):
     return p[2]  # the line
 
 
-def real_power(q, p):
-    return q[0] ** 0.3  # the line
-
-
-def symbolic_power(q, p):
-    return q[0] ** p[0]  # the line
-
-
-def exponential(q, p):
-    return 2 ** q[0]  # the line
-
-
-def remainder(q, p):
-    return q[0] % 2  # the line
-
-
 def not_finite(q, p):
     return q[0] * float("nan")  # the line
 
@@ -224,10 +208,6 @@ REFUSED: dict[Callable[..., Any], tuple[str, str]] = {
     unknown_function: ("unknown function 'm.sine'", "did you mean 'm.sin'"),
     nothing: ("H returns nothing", "return statement"),
     outside: ("p[2] does not exist", "0 to 1"),
-    real_power: ("the exponent 0.3", "m.exp(a*m.log(x))"),
-    symbolic_power: ("a symbol stands in an exponent", "m.exp(y*m.log(x))"),
-    exponential: ("a symbol stands in an exponent", "m.exp(x*m.log(a))"),
-    remainder: ("takes // or % of a symbol", "x - y*m.floor(x/y)"),
     not_finite: ("the constant nan is not finite", "finite numbers"),
     zero_division: ("divides by the constant 0", "not zero"),
     symbol_from_elsewhere: ("belongs to another traced function", "do not keep symbols"),
