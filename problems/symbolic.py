@@ -93,10 +93,10 @@ def from_sympy(
             raise InputError(
                 f"the equations of this {type(expression).__name__} are not formed; call its {formed} first."
             ) from error
-        if len(right) > len(state):
+        if matrix.rows > len(state):
             raise InputError(
-                f"the equations of this {type(expression).__name__} have {len(right)} unknowns for "
-                f"{len(state)} coordinates and velocities: the last {len(right) - len(state)} are Lagrange "
+                f"the equations of this {type(expression).__name__} have {matrix.rows} unknowns for "
+                f"{len(state)} coordinates and velocities: the last {matrix.rows - len(state)} are Lagrange "
                 "multipliers of its constraints; choose coordinates that are independent."
             )
         places: dict[Any, Callable[..., Any]] = {x: _component("y", i) for i, x in enumerate(state)}
