@@ -409,9 +409,17 @@ class TaylorStepper(RestorableStepper):
         self._stats.extra["side_steps"] += 1
 
     def _broken(self, t: float, y: Array) -> None:
-        self._fail(
-            Status.NOT_FINITE, t, y, f"heyoka met a state that is not finite in the step from t = {t!r}."
-        )
+        reason = f"heyoka met a state that is not finite in the step from t = {t!r}"
+        tc = np.asarray(self._ta.tc)
+        infinite = ~np.isfinite(tc).all(axis=0)
+        if infinite.any() and not infinite[:2].any():  # the state and the field are finite
+            order, most = int(infinite.argmax()), tc.shape[1] - 1
+            reason += (
+                f": the Taylor coefficients from order {order} of {most} leave the range of doubles. "
+                "The motion has a singularity here, or is many orders of magnitude faster than the unit "
+                "of time; in SI units of atoms or molecules take a shorter one"
+            )
+        self._fail(Status.NOT_FINITE, t, y, f"{reason}.")
 
     def _save(self) -> Any:
         return copy.copy(self._ta), self._sign, self._stepped

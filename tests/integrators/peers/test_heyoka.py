@@ -1,4 +1,5 @@
 import copy
+import re
 
 import numpy as np
 import pytest
@@ -191,3 +192,18 @@ def test_parameters_that_the_formulas_do_not_contain():
     assert np.abs(many.y[:, :, 0] - np.cos([1.0, 2.0])).max() < 1e-15  # measured 1e-16
     q = solutions.taylor(problem, np.array([0.0, 2.0]), "1e-28")[1][0]
     assert abs(float(q) - np.cos(2.0)) < 1e-16  # measured 0
+
+
+def test_a_motion_too_fast_for_the_unit_of_time_is_told_so():
+    """An electron about a proton in SI units: 4e16 radians a second, to the power 20."""
+
+    def atom(q, p, m):
+        return (p[0] ** 2 + p[1] ** 2) / 1.8218767403e-30 - 2.3070775523e-28 / m.sqrt(q[0] ** 2 + q[1] ** 2)
+
+    system = Hamiltonian(atom, dof=2)
+    problem = Problem(system, q0=[5.29177e-11, 0.0], p0=[0.0, 1.79e-24], t_end=1e-14)
+    solution = integrate(problem, Taylor())
+    assert solution.status is Status.NOT_FINITE
+    assert re.search(
+        r"order (19|20) of 20 leave the range of doubles.* unit of time.* shorter one\.", solution.reason
+    )
