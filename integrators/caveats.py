@@ -146,6 +146,17 @@ def of_losses(losses: Losses) -> tuple[str, ...]:
     )
 
 
+def of_tables(left: tuple[float, float, float, float] | None) -> tuple[str, ...]:
+    """Return the sentence on a table that has no data at a state."""
+    if left is None:
+        return ()
+    t, x, first, last = left
+    return (
+        f"at t = {t!r} the argument of m.table is {x:.6g}, beyond its data from {first!r} to {last!r}: the "
+        "outer piece was extrapolated; give more points, or m.table(..., extrapolate=True).",
+    )
+
+
 def undetected(problem: Problem, why: str | None) -> str | None:
     """Return the sentence on a field with discontinuities that a method does not look for, if it is one.
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from integrators.caveats import LOOKED_AT, lost_invariants, of_losses, warnings
+from integrators.caveats import LOOKED_AT, lost_invariants, of_losses, of_tables, warnings
 from integrators.plain import (
     doubles,
     packed,
@@ -27,6 +27,7 @@ from integrators.plain import (
 from integrators.protocol import Array, DoubleDouble, MethodBase, Program, Stats, Status
 from integrators.segments import Segments
 from problems.analysis import deviations, invariants
+from problems.analysis.tables import states_beyond
 from problems.bodies import Elements, elements
 from problems.checks import File, checked_arguments, readable
 from problems.double_double import DD
@@ -359,10 +360,12 @@ class Solution:
             problem.system, conserved, problem.y0[None], self.t, self.y[None], problem.par[None],
             np.array([self.stats.steps]),
         )[0]  # fmt: skip
-        for name, loss in extra.get("losses", {}).items():  # what was seen at checkpoints
+        for name, seen in extra.get("losses", {}).items():  # what was seen at checkpoints
+            loss = tuple(seen) if len(seen) == 2 else (seen[0], seen[1] / seen[2])  # of version 0.1
             if name not in lost or abs(loss[0] - problem.t0) < abs(lost[name][0] - problem.t0):
                 lost[name] = loss
-        return said + of_losses(lost)
+        left = states_beyond(problem.system, problem.par, self.t, self.y) if self.t.size else None
+        return said + of_losses(lost) + of_tables(left)
 
     def invariants(self) -> dict[str, Array]:
         """Return the problem's invariants along the trajectory, by name, with the parameters of each time."""

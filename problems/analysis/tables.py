@@ -4,7 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from problems.analysis.switches import affine_pieces
+from problems.calculus.function import function_of
 from problems.errors import InputError
+from problems.evaluate.pairs import evaluate
 from problems.systems.base import System
 from problems.trace.graph import STATE, T, reachable
 
@@ -42,3 +44,45 @@ def check_tables(system: System, par: NDArray[np.float64], t0: float, t1: float)
                 f"m.table has data from {first!r} to {last!r}, and from t = {t0!r} to {t1!r} its argument is "
                 f"{low!r} to {high!r}; end earlier, give more points, or m.table(..., extrapolate=True)."
             )
+
+
+def states_beyond(
+    system: System, par: NDArray[np.float64], t: NDArray[np.float64], y: NDArray[np.float64]
+) -> tuple[float, float, float, float] | None:
+    """Return the first of some states at which a table of the state has no data.
+
+    Parameters
+    ----------
+    system : System
+        Whose field is looked at; tables inside of loops are not.
+    par : ndarray, shape (n_par,) or (n_par, n)
+        Parameters.
+    t, y : ndarray, shapes (n,), (n, dim)
+        Times and states.
+
+    Returns
+    -------
+    tuple of float or None
+        Its time, the argument there, and the ends of the data.
+    """
+    nodes = reachable(system.field.roots) if system.field is not None else []
+    tables = [
+        node
+        for node in nodes
+        if node.op == "table"
+        and not node.data.extrapolate
+        and node.args[0].flags & STATE
+        and node.args[0].loop is None
+    ]
+    if not tables:
+        return None
+    arguments = function_of(tables[0].graph, [node.args[0] for node in tables])
+    found = []
+    for node, values in zip(tables, evaluate(arguments, t, np.ascontiguousarray(y.T), par), strict=True):
+        first, last = node.data.knots[0], node.data.knots[-1]
+        x = values.rounded()
+        outside = np.flatnonzero((x < first) | (x > last))
+        if outside.size:
+            i = int(outside[0])
+            found.append((float(t[i]), float(x[i]), first, last))
+    return min(found, default=None)

@@ -415,6 +415,12 @@ class TestTablesBeyondTheirData:
         exact = float(CubicSpline(self.TIMES, self.VALUES).antiderivative()(11.0))
         assert solution.y[-1, 0] == pytest.approx(exact, rel=1e-13)
 
+    @pytest.mark.parametrize(("end", "told"), [(0.9, False), (1.5, True)])
+    def test_a_state_beyond_the_data_is_told(self, end, told):
+        system = VectorField(lambda y, m: [1.0 + 0 * m.table(y[0], [0, 0.5, 1.0], [1, 2, 1])], dim=1)
+        solution = integrate(Problem(system, y0=[0.0], t_end=2.0), HBVM(), [0.5, end])
+        assert [one[:7] for one in solution.warnings if "m.table" in one] == ["at t = "] * told
+
     @pytest.mark.parametrize("seed", range(20))
     def test_random_arguments(self, seed):
         rng = np.random.default_rng(seed)
