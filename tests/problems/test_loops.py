@@ -324,3 +324,66 @@ def test_an_index_is_found_as_an_affine_function_of_others():
     rows = np.indices((7, 5)).reshape(2, -1).T
     assert affine(rows, 5 * rows[:, 0] + rows[:, 1]).coefficients == (5, 1)
     assert affine(rows, rows[:, 0] ** 2) is None
+
+
+def random_network(seed: int) -> VectorField:
+    """Return a field of random terms over random lists, two of them one after the other."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(2, 7))
+    near = [rng.integers(0, n, rng.integers(0, 4)).tolist() for _ in range(n)]
+    links = rng.integers(0, n, (int(rng.integers(1, 9)), 2))
+    matrix = rng.normal(size=(n, n)) * (rng.random((n, n)) < 0.6)
+    constants = rng.normal(size=n)
+    outer = rng.integers(0, 4, 2)
+
+    def f(y, par, m):
+        def wave(x):
+            return [m.sin(x), m.tanh(x), x * x, x / (1 + x * x)][outer[0]]
+
+        def total(i, js):
+            return m.sum(lambda j: par.K[i, j] * wave(y[j] - c[i] * y[i]), js)
+
+        c, flow = m.array(constants), m.dot(matrix, y)
+        first = m.each(lambda i, js: wave(flow[i]) + total(i, js), enumerate(near))
+        pulled = m.scatter(lambda i, j: {i: first[j] * y[i], j: -wave(first[i])}, links, n)
+        mean = m.sum(lambda i: first[i] * y[i], range(n)) / n
+        if outer[1] == 0:
+            return pulled
+        last = m.each(lambda i: pulled[i] * par.a + mean * c[i] + first[n - 1 - i], range(n))
+        return [last[0], *list(last)[1:]] if outer[1] == 3 else last
+
+    parameters = {"K": rng.normal(size=(n, n)), "a": 0.7}
+    return VectorField(f, dim=n, parameters=parameters, name=f"random_{seed}")
+
+
+def check_random(seed: int) -> None:
+    system = random_network(seed)
+    y, par = np.random.default_rng(seed).normal(size=system.dim), system.pack()
+
+    def both(function, state):
+        looped, unrolled = (emit.numpy(system, function, limit=limit)(0.0, state, par) for limit in (0, None))
+        scale = 1.0 + np.abs(unrolled).max()
+        assert looped == pytest.approx(unrolled, abs=1e-13 * scale)  # measured 2e-15
+        return unrolled
+
+    both("field", y)
+    along = np.random.default_rng(seed + 1).normal(size=system.dim)
+    jacobian = system.jacobian()
+    matrix = np.zeros((system.dim, system.dim))
+    matrix[jacobian.rows, jacobian.columns] = both(jacobian.function, y)
+    scale = 1.0 + np.abs(matrix).max()
+    tangent = both(system.tangent("field", 1), np.concatenate([along, y]))
+    product = both(system.product("state"), np.concatenate([along, y]))
+    assert matrix @ along == pytest.approx(tangent, abs=1e-12 * scale)
+    assert along @ matrix == pytest.approx(product, abs=1e-12 * scale)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_random_loops_and_their_derivatives_are_those_of_the_unrolled_formula(seed):
+    check_random(seed)
+
+
+@pytest.mark.slow
+def test_many_random_loops_and_their_derivatives_are_those_of_the_unrolled_formula():
+    for seed in range(20, 500):
+        check_random(seed)
