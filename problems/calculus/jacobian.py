@@ -162,6 +162,8 @@ class _Entries:
         for other, entries in inner.loops.items():
             for (at, column), node in entries.items():
                 first, second = _meeting(read, at.values(other))
+                if first.size == 0:  # nothing reads what these terms fill
+                    continue
                 both = _child(other, loop, first, second)
                 shift = 0 if both is other else loop.width
                 if both is None:

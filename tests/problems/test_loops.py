@@ -378,12 +378,12 @@ def check_random(seed: int) -> None:
     assert along @ matrix == pytest.approx(product, abs=1e-12 * scale)
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", [*range(18), 273, 289])  # the last two: terms that nothing reads
 def test_random_loops_and_their_derivatives_are_those_of_the_unrolled_formula(seed):
     check_random(seed)
 
 
 @pytest.mark.slow
 def test_many_random_loops_and_their_derivatives_are_those_of_the_unrolled_formula():
-    for seed in range(20, 500):
+    for seed in range(18, 500):
         check_random(seed)
