@@ -3,7 +3,7 @@
 from integrators.dynamics.adjoint import gradient
 from integrators.dynamics.indicators import Indicator, finite_time_exponent, gali, megno, sali
 from integrators.dynamics.lyapunov import Exponents, lyapunov
-from integrators.dynamics.maps import ExponentMap, IndicatorMap, indicator_map, lyapunov_map
+from integrators.dynamics.maps import ExponentMap, IndicatorMap, indicator_map, lyapunov_map, megno_map
 from integrators.dynamics.orbits import PeriodicOrbit, continued, periodic
 
 __all__ = [
@@ -20,6 +20,7 @@ __all__ = [
     "lyapunov",
     "lyapunov_map",
     "megno",
+    "megno_map",
     "periodic",
     "sali",
 ]

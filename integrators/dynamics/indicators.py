@@ -101,19 +101,13 @@ def megno(
     method = registry.create("HBVM") if method is None else method
     times = sampling_times(problem, method, t_end, samples)
     course = Course(problem, method, random_vectors(problem.system.dim, 1))
-    t_, values = [times[:0]], [times[:0]]
-    time = length = growth = integral = total = 0.0  # at the last step: log d, Y and both integrals
+    t_, values, mean, before = [times[:0]], [times[:0]], MeanGrowth(1), problem.t0
     for chunk in course.by_steps(float(times[-1])):
-        t = np.concatenate([[time], chunk.t - problem.t0])
-        lengths = np.concatenate([[length], chunk.logarithms[:, 0]])
-        integrals = integral + _integral(t, lengths)
-        growths = np.concatenate([[growth], 2.0 * (lengths[1:] - integrals / t[1:])])
-        totals = total + _integral(t, growths)
-        passed = np.searchsorted(times - problem.t0, t, side="right")
+        passed = np.searchsorted(times, np.concatenate([[before], chunk.t]), side="right")
         wanted = np.diff(passed) > 0
         t_.append(chunk.t[wanted])
-        values.append((totals / t[1:])[wanted])
-        time, length, growth, integral, total = t[-1], lengths[-1], growths[-1], integrals[-1], totals[-1]
+        values.append(mean.after(chunk.t - problem.t0, chunk.logarithms.T)[0, wanted])
+        before = chunk.t[-1]
     return Indicator(np.concatenate(t_), np.concatenate(values), course.status, course.reason, course.steps)
 
 
@@ -219,9 +213,36 @@ def finite_time_exponent(
     )
 
 
+class MeanGrowth:
+    """MEGNO of n trajectories from the lengths of their vectors at the ends of steps; see `megno`."""
+
+    def __init__(self, n: int):
+        # at the last step: the time, and of each log d, Y and both integrals
+        self._time, (self._length, self._growth, self._integral, self._total) = 0.0, np.zeros((4, n, 1))
+
+    def after(self, t: Array, lengths: Array) -> Array:
+        """Return MEGNO after further steps, shape (n, m).
+
+        Parameters
+        ----------
+        t : ndarray, shape (m,)
+            The time since the start.
+        lengths : ndarray, shape (n, m)
+            Logarithms of the lengths relative to those at the start.
+        """
+        times = np.concatenate([[self._time], t])
+        lengths = np.concatenate([self._length, lengths], axis=1)
+        integrals = self._integral + _integral(times, lengths)
+        growths = np.concatenate([self._growth, 2.0 * (lengths[:, 1:] - integrals / t)], axis=1)
+        totals = self._total + _integral(times, growths)
+        self._time, self._length, self._growth = float(t[-1]), lengths[:, -1:], growths[:, -1:]
+        self._integral, self._total = integrals[:, -1:], totals[:, -1:]
+        return totals / t
+
+
 def _integral(t: Array, values: Array) -> Array:
     """Return the integrals up to each time but the first, by trapezoids."""
-    return np.cumsum(np.diff(t) * (values[1:] + values[:-1]) / 2.0)
+    return np.cumsum(np.diff(t) * (values[:, 1:] + values[:, :-1]) / 2.0, axis=1)
 
 
 def _followed(

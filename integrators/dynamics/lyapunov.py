@@ -190,7 +190,7 @@ def checked_span(problem: Problem, count: int | None, t_end: float | None, skip:
         raise InputError(f"count={n} is more than the {system.dim} components of {system.name}.")
     if not problem.t0 + skip < end or skip < 0.0:
         raise InputError(f"t_end={end!r} leaves no time after t0={problem.t0!r} and skip={skip!r}.")
-    if np.count_nonzero(_marks(problem, end) >= problem.t0 + skip) <= 2 * WAVES:
+    if np.count_nonzero(interval_ends(problem, end) >= problem.t0 + skip) <= 2 * WAVES:
         raise InputError(f"skip={skip!r} leaves too little of the time for intervals; give a later t_end.")
     return n, end
 
@@ -212,8 +212,8 @@ def exponents_of(
     """
     system, start = problem.system, problem.t0 + skip
     whole, known = n == system.dim, Divergence(problem)
-    stepper, frame = with_variations(problem, method), _frame(system.dim, system.dof)[:, :n]
-    course = stepper.frames(frame, _marks(problem, end), divergence=whole and known.constant is None)
+    stepper, frame = with_variations(problem, method), canonical_frame(system.dim, system.dof)[:, :n]
+    course = stepper.frames(frame, interval_ends(problem, end), divergence=whole and known.constant is None)
     broken: KeyboardInterrupt | None = None
     try:
         status, reason = course.go_on()
@@ -230,7 +230,7 @@ def exponents_of(
         text = f"there are too few steps after skip={skip!r} for intervals: {why}"
         raise NoAveragesError(text, status if status.failed else Status.NOT_FINITE, steps)
     canonical = whole and system.dof is not None
-    exponents, intervals, pairs, time = _averaged(start, times, growth, canonical)
+    exponents, intervals, pairs, time = averaged(start, times, growth, canonical)
     first = int(np.searchsorted(times, start))
     if whole and known.constant is None:
         divergence = float(course.divergence[counted][first + 1 :].sum()) / time
@@ -250,12 +250,12 @@ def exponents_of(
     )
 
 
-def _marks(problem: Problem, end: float) -> Array:
+def interval_ends(problem: Problem, end: float) -> Array:
     """Return the ends of the intervals."""
     return np.linspace(problem.t0, end, INTERVALS + 1)[1:]
 
 
-def _frame(dim: int, dof: int | None) -> Array:
+def canonical_frame(dim: int, dof: int | None) -> Array:
     """Return an orthonormal frame: of a canonical system, one whose QR keeps pairs, u_i and J u_(n+1-i)."""
     rng = np.random.default_rng(0)
     if dof is None:
@@ -266,7 +266,7 @@ def _frame(dim: int, dof: int | None) -> Array:
     return np.concatenate([first, second[:, ::-1]], axis=1)
 
 
-def _averaged(
+def averaged(
     start: float, times: Array, growth: Array, canonical: bool
 ) -> tuple[Array, Array, float | None, float]:
     """Return exponents, intervals, pairs and the time, from the growth of vectors between times."""

@@ -1,8 +1,8 @@
 """Indicators of chaos, and Lyapunov exponents, over many initial conditions or parameters."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -12,8 +12,26 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from integrators import registry
-from integrators.dynamics.indicators import SAMPLES, Indicator, finite_time_exponent, gali, megno, sali
-from integrators.dynamics.lyapunov import NoAveragesError, checked_span, exponents_of
+from integrators.dynamics.indicators import (
+    SAMPLES,
+    Indicator,
+    MeanGrowth,
+    finite_time_exponent,
+    gali,
+    megno,
+    sali,
+)
+from integrators.dynamics.lyapunov import (
+    WAVES,
+    NoAveragesError,
+    averaged,
+    canonical_frame,
+    checked_span,
+    exponents_of,
+    interval_ends,
+)
+from integrators.dynamics.together import Together
+from integrators.dynamics.vectors import random_vectors, sampling_times
 from integrators.options import Count
 from integrators.protocol import Array, MethodBase, Status, check_problem
 from integrators.running.integrate import SECONDS, NotNegative
@@ -58,6 +76,30 @@ class IndicatorMap:
     par: Array
     warning: str
 
+    def draw(self, x: ArrayLike, y: ArrayLike, axes: Any = None, **options: Any) -> Any:
+        """Draw the values over a grid with matplotlib.
+
+        Parameters
+        ----------
+        x, y : array_like, shapes (n_x,), (n_y,)
+            The grid, whose points are the trajectories in this order: all of y for each x, as
+            `problems.bodies.starts` has them for ``Orbit(a=x[:, np.newaxis], e=y)``.
+        axes : matplotlib.axes.Axes, optional
+            By default the current ones.
+        **options
+            For ``pcolormesh``, such as ``vmin`` and ``cmap``.
+
+        Returns
+        -------
+        matplotlib.collections.QuadMesh
+
+        Raises
+        ------
+        problems.errors.InputError
+            If the grid has another number of points.
+        """
+        return _drawn(self.values, x, y, axes, options)
+
 
 @dataclass(frozen=True, eq=False)
 class ExponentMap:
@@ -70,7 +112,7 @@ class ExponentMap:
     intervals : ndarray, shape (n, count, 2)
         Each with 95 % confidence, or a bound of convergence, as in `Exponents`.
     sum, divergence, pairs : ndarray, shape (n,)
-        As in `Exponents`; NaN where that has ``None``.
+        As in `Exponents`; NaN where that has ``None``, and the divergence of those in lanes.
     status : list of Status
         How each ended.
     reason : list of str
@@ -94,6 +136,24 @@ class ExponentMap:
     par: Array
     warning: str
 
+    def draw(self, x: ArrayLike, y: ArrayLike, axes: Any = None, **options: Any) -> Any:
+        """Draw the largest exponents over a grid; see `IndicatorMap.draw`."""
+        return _drawn(self.exponents[:, 0], x, y, axes, options)
+
+
+def _drawn(values: Array, x: ArrayLike, y: ArrayLike, axes: Any, options: Mapping[str, Any]) -> Any:
+    across, up = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
+    if across.ndim != 1 or up.ndim != 1 or across.size * up.size != values.size:
+        raise InputError(
+            f"a grid of shapes {across.shape} and {up.shape} does not have the {values.size} points of the "
+            "map."
+        )
+    import matplotlib.pyplot as plt  # only who draws waits for it
+
+    axes = plt.gca() if axes is None else axes
+    grid = values.reshape(across.size, up.size).T
+    return axes.pcolormesh(across, up, grid, **{"shading": "nearest", "rasterized": True, **options})
+
 
 @checked_arguments
 def indicator_map(
@@ -114,8 +174,10 @@ def indicator_map(
 ) -> IndicatorMap:
     """Return an indicator of chaos for many initial conditions, or values of parameters.
 
-    Every trajectory is integrated by itself, as many at once as there are threads. Compiled steps run in
-    parallel; what Python does between them does not, so threads gain less where trajectories are short.
+    With a fixed step size ``"megno"`` is computed in SIMD lanes, if the components of a trajectory and its
+    vector are at most 64 (half of them in second-order form): see `megno_map`. Otherwise every trajectory is
+    integrated by itself, as many at once as there are threads. Compiled steps run in parallel; what Python
+    does between them does not, so threads gain less where trajectories are short.
 
     Parameters
     ----------
@@ -178,11 +240,57 @@ def indicator_map(
         raise InputError(f"k={k} is the order of indicator='gali'; leave it out for {indicator!r}.")
     options: dict[str, Any] = {"t_end": t_end, "samples": samples} | ({} if k is None else {"k": k})
     rows, par = members("indicator_map", problem, starts, parameters)
-    value = partial(_indicator, INDICATORS[indicator], method, options)
     belongs = identity(problem, method, _told(rows, par), f"{indicator} {options}", {})
     loop = _Loop(threads, progress, checkpoint, every_seconds, resume, belongs)
-    state, failure = loop.over(problem, rows, par, value, ())
+    together = Together(problem, method, random_vectors(problem.system.dim, 1), threads)
+    if indicator == "megno" and together.available:
+        times = _all_steps(problem, method, t_end)
+        state, failure = loop.over(
+            rows, par, partial(_megno, together, problem.t0, times), (), together.piece
+        )
+    else:
+        value = partial(_indicator, INDICATORS[indicator], method, options)
+        state, failure = loop.one_by_one(problem, rows, par, value, ())
     return IndicatorMap(state["values"], state["status"], state["reason"], rows, par, failure)
+
+
+@checked_arguments
+def megno_map(
+    problem: Problem,
+    method: MethodBase | None = None,
+    *,
+    starts: ArrayLike | None = None,
+    parameters: Named[ArrayLike] = NOTHING,
+    t_end: float | None = None,
+    threads: Count = 1,
+    progress: bool | Report = False,
+    checkpoint: File | None = None,
+    every_seconds: NotNegative = SECONDS,
+    resume: File | None = None,
+) -> IndicatorMap:
+    """Return MEGNO for many initial conditions, or values of parameters, of a problem with any forces.
+
+    It is ``indicator_map(problem, "megno", ...)``; see there for parameters, returns and errors.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from integrators import Gauss
+    >>> from integrators.dynamics import megno_map
+    >>> from problems import nbody
+    >>> from problems.bodies import J2, Orbit, starts
+    >>> orbits, flat = [Orbit(a=1.0), Orbit(a=0.6)], J2(1e-3, 0.01)
+    >>> sun = nbody([1.0, 1e-3], orbits=orbits, massless=1, forces=[flat], t_end=99.0)
+    >>> a, e = np.array([0.5, 0.85]), np.array([0.0, 0.1])
+    >>> grid = starts(sun, -1, Orbit(a=a[:, np.newaxis], e=e))
+    >>> found = megno_map(sun, Gauss(s=6, h=0.2), starts=grid)
+    >>> found.values.reshape(2, 2).shape
+    (2, 2)
+    """
+    return indicator_map(
+        problem, "megno", method, starts=starts, parameters=parameters, t_end=t_end, threads=threads,
+        progress=progress, checkpoint=checkpoint, every_seconds=every_seconds, resume=resume,
+    )  # fmt: skip
 
 
 @checked_arguments
@@ -203,8 +311,10 @@ def lyapunov_map(
 ) -> ExponentMap:
     """Return Lyapunov exponents with intervals for many initial conditions or parameters.
 
-    Every trajectory is integrated by itself, as many at once as there are threads; a grid is a list of its
-    points here.
+    With a fixed step size, and fewer exponents than components, trajectories are integrated in SIMD lanes, if
+    the components of a trajectory and its vectors are at most 64 (half of them in second-order form).
+    Otherwise every trajectory is integrated by itself, as many at once as there are threads. A grid is a list
+    of its points here, such as `problems.bodies.starts` returns.
 
     Parameters
     ----------
@@ -246,10 +356,17 @@ def lyapunov_map(
     check_problem(problem, method)
     n, end = checked_span(problem, count, t_end, skip)
     rows, par = members("lyapunov_map", problem, starts, parameters)
-    value = partial(_exponents, method, n, end, skip)
     belongs = identity(problem, method, _told(rows, par), f"lyapunov {(n, end, skip)}", {})
-    loop = _Loop(threads, progress, checkpoint, every_seconds, resume, belongs)
-    state, failure = loop.over(problem, rows, par, value, (3 * n + 3,))
+    loop, shape = _Loop(threads, progress, checkpoint, every_seconds, resume, belongs), (3 * n + 3,)
+    vectors = canonical_frame(problem.system.dim, problem.system.dof)[:, :n]
+    together = Together(problem, method, vectors, threads)
+    if n < problem.system.dim and together.available:
+        state, failure = loop.over(
+            rows, par, partial(_largest, together, problem, end, skip, n), shape, together.piece
+        )
+    else:
+        value = partial(_exponents, method, n, end, skip)
+        state, failure = loop.one_by_one(problem, rows, par, value, shape)
     exponents, low, high, checks = np.split(state["values"], [n, 2 * n, 3 * n], axis=1)
     return ExponentMap(
         exponents=exponents,
@@ -267,6 +384,8 @@ def lyapunov_map(
 
 Outcome = tuple[ArrayLike, Status, str, int]
 """The values of one trajectory, how it ended with the reason, and how many steps it took."""
+Outcomes = tuple[Any, Sequence[Status], Sequence[str], Any]
+"""The same of several."""
 
 
 @dataclass(frozen=True)
@@ -280,7 +399,7 @@ class _Loop:
     resume: Any
     belongs: Mapping[str, str]
 
-    def over(
+    def one_by_one(
         self,
         problem: Problem,
         rows: Array,
@@ -288,18 +407,40 @@ class _Loop:
         value: Callable[[Problem], Outcome],
         shape: tuple[int, ...],
     ) -> tuple[dict[str, Any], str]:
+        """Return what `over` does, from the values of one, in threads."""
+
+        def of_one(y0: Array, values: Array) -> Outcome:
+            parameters: Any = problem.system.unpack(values)
+            return value(problem.replace(y0=y0, parameters=parameters))
+
+        with ThreadPoolExecutor(self.threads) as pool:
+
+            def of_several(rows: Array, par: Array) -> Outcomes:
+                return tuple(zip(*pool.map(of_one, rows, par), strict=True))  # type: ignore[return-value]
+
+            return self.over(rows, par, of_several, shape, self.threads, first=1)  # it compiles what all need
+
+    def over(
+        self,
+        rows: Array,
+        par: Array,
+        value: Callable[[Array, Array], Outcomes],
+        shape: tuple[int, ...],
+        piece: int,
+        first: int | None = None,
+    ) -> tuple[dict[str, Any], str]:
         """Return the values of all, one in each row, and their ends; and why no file was written.
 
         Parameters
         ----------
-        problem : Problem
-            With other initial conditions and parameters for each.
         rows, par : ndarray, shapes (n, dim), (n, n_par)
-            These.
+            Initial conditions and parameters.
         value : callable
-            What makes the values of one.
+            What makes the values of several.
         shape : tuple of int
             Of the values of one.
+        piece, first : int
+            For how many at a time, and at first.
         """
         progress, n = self.progress, len(rows)
         if not callable(progress) and not isinstance(progress, bool):
@@ -315,30 +456,19 @@ class _Loop:
         earlier = None if self.resume is None else Path(self.resume)
         if earlier is not None and (earlier != path or earlier.exists()):
             state = read(earlier, self.belongs)
-
-        def of_one(y0: Array, values: Array) -> Outcome:
-            parameters: Any = problem.system.unpack(values)
-            return value(problem.replace(y0=y0, parameters=parameters))
-
         with Bar() if progress is True else nullcontext(progress or None) as report:
             watch = Watch(0.0, float(n), report, path, self.every_seconds, self.belongs)
-            try:
-                with ThreadPoolExecutor(self.threads) as pool:
-                    while (first := state["made"]) < n:
-                        count = self.threads if first else 1  # the first compiles what all need
-                        here = slice(first, first + count)
-                        values, status, reason, steps = zip(
-                            *pool.map(of_one, rows[here], par[here]), strict=True
-                        )
-                        state["values"][here] = values
-                        state["status"][here] = status
-                        state["reason"][here] = reason
-                        state["made"] = first + len(status)
-                        state["steps"] += sum(steps)
-                        watch.keep(state)
-                        watch.look(float(state["made"]), state["steps"])
-            except KeyboardInterrupt:
-                pass
+            with suppress(KeyboardInterrupt):
+                while (made := state["made"]) < n:
+                    here = slice(made, made + (piece if made or first is None else first))
+                    values, status, reason, steps = value(rows[here], par[here])
+                    state["values"][here] = values
+                    state["status"][here] = status
+                    state["reason"][here] = reason
+                    state["made"] = made + len(status)
+                    state["steps"] += sum(steps)
+                    watch.keep(state)
+                    watch.look(float(state["made"]), state["steps"])
             watch.write()
         return state, watch.failure
 
@@ -346,6 +476,43 @@ class _Loop:
 def _told(rows: Array, par: Array) -> Array:
     """Return what a file says of the trajectories."""
     return np.concatenate([rows.ravel(), par.ravel()])
+
+
+def _all_steps(problem: Problem, method: MethodBase, t_end: float | None) -> Array:
+    """Return the ends of the steps up to the last one that `sampling_times` has."""
+    h = method.options(defaults=True)["h"]
+    last = round((sampling_times(problem, method, t_end, 2)[-1] - problem.t0) / h)
+    return problem.t0 + h * np.arange(1, last + 1)
+
+
+def _megno(together: Together, t0: float, times: Array, rows: Array, par: Array) -> Outcomes:
+    """Return MEGNO of several trajectories in lanes."""
+    followed, mean = together.follow(rows, par, times), MeanGrowth(len(rows))
+    before, values = np.zeros((len(rows), 1)), np.full(len(rows), np.nan)
+    for part, growth in followed:
+        lengths = before + growth[:, :, 0]
+        before = lengths[:, -1:]
+        values = mean.after(times[part] - t0, lengths)[:, -1]
+    failed = np.array([status.failed for status in followed.status])
+    return np.where(failed, np.nan, values), followed.status, followed.reason, followed.steps
+
+
+def _largest(
+    together: Together, problem: Problem, end: float, skip: float, n: int, rows: Array, par: Array
+) -> Outcomes:
+    """Return the largest exponents of several trajectories in lanes, as `_exponents` does of one."""
+    times = together.steps_until(interval_ends(problem, end))
+    followed, values = together.follow(rows, par, times), np.full((len(rows), 3 * n + 3), np.nan)
+    if np.count_nonzero(times >= problem.t0 + skip) <= 2 * WAVES:
+        raise InputError(f"there are too few steps after skip={skip!r}: give a later t_end or shorter steps.")
+    grown = np.full((len(rows), times.size, n), np.nan)
+    for part, growth in followed:
+        grown[:, part] = np.diff(growth, axis=1, prepend=0.0)
+    for i, status in enumerate(followed.status):
+        if not status.failed:
+            exponents, intervals, _, _ = averaged(problem.t0 + skip, times, grown[i], False)
+            values[i, : 3 * n + 1] = np.concatenate([exponents, *intervals.T, [exponents.sum()]])
+    return values, followed.status, followed.reason, followed.steps
 
 
 def _indicator(

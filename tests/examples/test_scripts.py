@@ -26,6 +26,7 @@ SAYS = {
     "geodesics.py": ["from 3.30 to 20.47 ", "energy kept: True"],
     "lattice.py": ["accurate: HBVM(k=8, s=4, h=0.25), heyoka, SciPy's DOP853"],
     "bodies.py": ["the same places to 1e-8 au: True", "names are kept: True"],
+    "chaos_map.py": ["regular and chaotic alike: True", "the difference of two orbits: True", "12 x 12 in "],
     "exponents.py": ["accurate: integrators.lyapunov, heyoka"],
     "ensemble.py": ["28% of 10000 orbits are chaotic"],
     "networks.py": ["network: the same state as SciPy's: True", "grid: the same state as SciPy's: True"],

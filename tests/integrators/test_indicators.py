@@ -152,7 +152,9 @@ def test_a_map_has_the_indicators_of_its_starts():
         assert set(found.status) == {Status.FINISHED}
 
 
-def test_a_map_that_was_broken_off_goes_on(tmp_path):
+def test_a_map_that_was_broken_off_goes_on(tmp_path, monkeypatch):
+    monkeypatch.setattr("integrators.dynamics.together.PIECE", 1)
+
     def stop(progress):
         if progress.t >= 3:
             raise KeyboardInterrupt
