@@ -36,12 +36,12 @@ import lineax as lx  # noqa: E402
 import optimistix as optx  # noqa: E402
 
 from integrators.plugins.diffrax.arithmetic import add, apply, real  # noqa: E402
-from integrators.plugins.diffrax.ending import end_state  # noqa: E402
 from integrators.plugins.diffrax.fixed_point import FixedPoint  # noqa: E402
 from integrators.plugins.diffrax.interpolation import LegendreInterpolation  # noqa: E402
+from integrators.plugins.diffrax.states import end_state, states  # noqa: E402
 from integrators.plugins.rule import FARTHEST, FLOOR, MODES  # noqa: E402
 
-__all__ = ["HBVM", "FixedPoint", "Gauss", "end_state"]
+__all__ = ["HBVM", "FixedPoint", "Gauss", "end_state", "states"]
 
 DENSE = 48  # unknowns up to which derivatives solve by LU; GMRES beyond
 

@@ -36,3 +36,10 @@ def test_without_a_host_the_plugin_says_what_to_install_and_the_rest_works(
     assert done.returncode == 0, done.stderr
     assert f"{host} is not installed" in done.stdout
     assert 'pip install "hbvm-bench[peers]"' in done.stdout
+
+
+def test_without_pytorch_the_plugin_says_what_to_install() -> None:
+    code = BLOCKED.format(host="torch", blocked=["torch"])
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "install it with pip install torch" in done.stdout

@@ -10,7 +10,7 @@ from problems import InputError
 jax = pytest.importorskip("jax")
 pytest.importorskip("diffrax")
 
-from integrators.plugins.diffrax import end_state  # noqa: E402
+from integrators.plugins.diffrax import end_state, states  # noqa: E402
 from integrators.plugins.diffrax.many import DOUBLE  # noqa: E402
 
 
@@ -48,3 +48,29 @@ def test_many_starts_and_no_parameters():
 def test_single_precision_is_refused():
     with DOUBLE(False), pytest.raises(InputError, match="jax_enable_x64"):
         end_state(problems.load("pendulum"), HBVM())
+
+
+def test_states_at_times_have_the_gradient_of_a_sum_over_samples():
+    problem, times = problems.load("double_pendulum"), [0.5, 1.0, 1.5]
+    at = states(problem, HBVM(tol=1e-12), times)
+    value, grads = gradient(problem, HBVM(tol=1e-12), lambda y: y[0] * y[3], ["y0"], times=times)
+
+    def loss(y0, par):
+        return (at(y0, par)[:, 0] * at(y0, par)[:, 3]).sum()
+
+    found, by_start = jax.jit(jax.value_and_grad(loss))(problem.y0, problem.par)
+    assert float(found) == pytest.approx(value, rel=1e-14)
+    assert np.allclose(by_start, grads["y0"], rtol=1e-13, atol=0.0)
+
+
+def test_many_trajectories_run_in_threads_with_the_same_derivatives():
+    problem = problems.load("pendulum")
+    starts = np.array([[0.1, 0.5], [1.0, 0.0], [0.3, -0.2]])
+    found = []
+    for threads in (1, 3):
+        at = states(problem, Gauss(s=4, h=0.1), [1.0, 2.0], threads=threads)
+        loss = jax.grad(lambda y0, par, at=at: (at(y0, par) ** 2).sum())
+        found.append(np.asarray(jax.vmap(loss, in_axes=(0, None))(starts, problem.par)))
+    alone = [np.asarray(loss(row, problem.par)) for row in starts]
+    assert np.array_equal(found[0], found[1])
+    assert np.array_equal(found[0], alone)
