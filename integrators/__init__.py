@@ -7,6 +7,13 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+import problems
+
+if not hasattr(problems, "VectorField"):  # a file of the user
+    raise ImportError(
+        f"integrators needs hbvm-bench's package problems, but {problems.__file__} has that name; rename it."
+    )
+
 from integrators import registry
 from integrators.ensemble import Solutions, load
 from integrators.protocol import MethodBase, Samples, Stats, Status
