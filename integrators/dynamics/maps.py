@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from integrators import registry
+from integrators.dynamics.divergence import Divergence
 from integrators.dynamics.indicators import (
     SAMPLES,
     Indicator,
@@ -112,7 +113,7 @@ class ExponentMap:
     intervals : ndarray, shape (n, count, 2)
         Each with 95 % confidence, or a bound of convergence, as in `Exponents`.
     sum, divergence, pairs : ndarray, shape (n,)
-        As in `Exponents`; NaN where that has ``None``, and the divergence of those in lanes.
+        As in `Exponents`; NaN where that has ``None``.
     status : list of Status
         How each ended.
     reason : list of str
@@ -489,7 +490,7 @@ def _megno(together: Together, t0: float, times: Array, rows: Array, par: Array)
     """Return MEGNO of several trajectories in lanes."""
     followed, mean = together.follow(rows, par, times), MeanGrowth(len(rows))
     before, values = np.zeros((len(rows), 1)), np.full(len(rows), np.nan)
-    for part, growth in followed:
+    for part, _, growth in followed:
         lengths = before + growth[:, :, 0]
         before = lengths[:, -1:]
         values = mean.after(times[part] - t0, lengths)[:, -1]
@@ -506,12 +507,18 @@ def _largest(
     if np.count_nonzero(times >= problem.t0 + skip) <= 2 * WAVES:
         raise InputError(f"there are too few steps after skip={skip!r}: give a later t_end or shorter steps.")
     grown = np.full((len(rows), times.size, n), np.nan)
-    for part, growth in followed:
-        grown[:, part] = np.diff(growth, axis=1, prepend=0.0)
+    states = np.full((len(rows), times.size, problem.system.dim), np.nan)
+    for part, there, growth in followed:
+        grown[:, part], states[:, part] = np.diff(growth, axis=1, prepend=0.0), there
+    first = int(np.searchsorted(times, problem.t0 + skip))
     for i, status in enumerate(followed.status):
         if not status.failed:
             exponents, intervals, _, _ = averaged(problem.t0 + skip, times, grown[i], False)
-            values[i, : 3 * n + 1] = np.concatenate([exponents, *intervals.T, [exponents.sum()]])
+            parameters: Any = problem.system.unpack(par[i])
+            known = Divergence(problem.replace(parameters=parameters))
+            divergence = known.mean(times[first:], states[i, first:])
+            checks = [exponents.sum(), divergence]
+            values[i, : 3 * n + 2] = np.concatenate([exponents, *intervals.T, checks])
     return values, followed.status, followed.reason, followed.steps
 
 

@@ -90,10 +90,10 @@ class Followed:
         self.status, self.reason = [Status.FINISHED] * len(rows), [""] * len(rows)
         self.steps = np.zeros(len(rows), dtype=np.int64)
 
-    def __iter__(self) -> Iterator[tuple[slice, Array]]:
-        """Yield which times there were, and the logarithms of the growth since the start of their round.
+    def __iter__(self) -> Iterator[tuple[slice, Array, Array]]:
+        """Yield which times there were, the states, and logarithms of the growth since the round began.
 
-        These have the shape (n, m, k); NaN where a trajectory has failed.
+        These have the shapes (n, m, dim) and (n, m, k); NaN where a trajectory has failed.
         """
         n, dim = self._rows.shape
         count = self._vectors.shape[2]
@@ -113,6 +113,8 @@ class Followed:
                 continue
             growth = np.full((n, logs.shape[1], count), np.nan)
             growth[alive] = logs
+            states = np.full((n, logs.shape[1], dim), np.nan)
+            states[alive] = found.y
             self._rows[alive], self._vectors[alive] = found.y[:, -1], frames
             self.steps[alive] += found.steps
             for i, status, reason in zip(alive.tolist(), found.status, found.reason, strict=True):
@@ -122,7 +124,7 @@ class Followed:
                 if self.status[i] is Status.FINISHED:
                     self.status[i] = Status.NOT_FINITE
                     self.reason[i] = f"tangent vectors leave the range of doubles after t = {t!r}."
-            yield part, growth
+            yield part, states, growth
             alive = np.array([i for i in alive.tolist() if self.status[i] is Status.FINISHED], dtype=np.int64)
             first, t = first + logs.shape[1], float(self._times[part][-1])
             size = int(min(max(size * AIM / max(extent, 1e-9), 1.0), 4 * size, most))

@@ -265,7 +265,9 @@ def test_a_map_has_the_exponents_of_its_parameters():
         assert found.exponents.shape == (3, 5)
 
 
-def test_a_map_that_was_broken_off_goes_on(tmp_path):
+def test_a_map_that_was_broken_off_goes_on(tmp_path, monkeypatch):
+    monkeypatch.setattr("integrators.dynamics.together.PIECE", 1)
+
     def stop(progress):
         if progress.t >= 2:
             raise KeyboardInterrupt
