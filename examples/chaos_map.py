@@ -71,7 +71,7 @@ def main() -> None:
     found = megno_map(forced, METHOD, starts=grid, threads=2, progress=True)
     chaotic, lost = np.sum(found.values > 3.0), np.sum(np.isnan(found.values))
     print(f"a map of {n} x {n} in {perf_counter() - began:.0f} s")
-    print(f"{chaotic} chaotic, {lost} too near to Jupiter for steps of one length")
+    print(f"{chaotic} chaotic, {lost} too near to Jupiter for a fixed step size")
     if len(sys.argv) > 2:
         import matplotlib.pyplot as plt
 
