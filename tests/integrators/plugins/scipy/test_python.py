@@ -182,7 +182,7 @@ def test_components_that_stay_zero_are_no_division_by_zero() -> None:
 def test_an_iteration_that_diverges_warns_of_nothing_and_errors_at_states_are_the_users() -> None:
     solution = solve_ivp(lambda t, y: -1e3 * (np.exp(5.0 * y) - 1.0), (0.0, 1.0), [1.0], method=HBVM, s=3)
     assert solution.success
-    assert abs(solution.y[0, -1]) < 1e-3  # measured
+    assert abs(solution.y[0, -1]) < 1e-3  # measured 2e-17
     with pytest.warns(RuntimeWarning, match="invalid value encountered in sqrt"):
         solve_ivp(lambda t, y: np.sqrt(y - 1.0), (0.0, 1.0), [0.5], method=HBVM)
     with np.errstate(invalid="raise"), pytest.raises(FloatingPointError):
