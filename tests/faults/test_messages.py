@@ -5,7 +5,7 @@ import pytest
 
 import problems
 from integrators import HBVM, integrate
-from problems import Hamiltonian, InputError, Problem, VectorField
+from problems import Hamiltonian, InputError, Problem
 
 SPRING = Problem(Hamiltonian(lambda q, p: (p[0] ** 2 + q[0] ** 2) / 2, dof=1), q0=[1.0], p0=[0.0], t_end=1.0)
 
@@ -52,8 +52,3 @@ def test_multipliers_of_sympys_equations_are_named():
     equations.form_lagranges_equations()
     with pytest.raises(InputError, match=r"5 unknowns for 4 coordinates.*last 1 are Lagrange multipliers"):
         problems.from_sympy(equations, parameters={m: 1.0, g: 9.81, length: 1.0})
-
-
-def test_a_power_says_for_which_numbers():
-    with pytest.raises(InputError, match=r"for x >= 0 write x\*\*y as"):
-        VectorField(lambda y: [y[0] ** y[0]], dim=1)
