@@ -1,6 +1,6 @@
 """Numbers of the text from stored results: a page names a cell of a report's table, the build inserts it.
 
-A report's text is drawn from its archive, ``results.json.xz``, and from nothing else, so its tables are
+A report's text is drawn from its rows, ``results.sqlite.xz``, and from nothing else, so its tables are
 the stored values with the digits that readers see.
 """
 

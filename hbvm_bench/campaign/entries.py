@@ -194,7 +194,7 @@ class Page(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     by_processor : bool
         Whether a report keeps the results of several kinds of processor side by side.
     series : list of str
-        Names of the series that a report's archive keeps; the figures of others are kept as drawn.
+        Names of the series that lie beside a report; the figures of others are kept as drawn.
     """
 
     blocks: list[str] = []

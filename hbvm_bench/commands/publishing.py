@@ -6,19 +6,15 @@ from pathlib import Path
 import typer
 
 from hbvm_bench.report import terminal
-from hbvm_bench.report.archived import contents, joined
 from hbvm_bench.report.document import Document
 from hbvm_bench.report.page import Results, gather, page_of
+from hbvm_bench.report.stored import contents, joined
 from hbvm_bench.report.write import write
-from hbvm_bench.store import archive
-from hbvm_bench.store.archive import Archive, Contents
-from hbvm_bench.store.store import Store
+from hbvm_bench.store.store import PACKED, Store
 
 
-def report_on(
-    stores: Sequence[Store] | Sequence[Archive], directory: Path, *, stderr: bool = True
-) -> Results:
-    """Write the page of runs with its archive, and return what it is made of.
+def report_on(stores: Sequence[Store], directory: Path, *, stderr: bool = True) -> Results:
+    """Write the page of runs with the rows that it is made of, and return these.
 
     Where its campaign has results of several kinds of processor side by side, those that lie there stay.
 
@@ -27,19 +23,18 @@ def report_on(
     problems.errors.InputError
         If a store holds no finished case, or the directory cannot be written.
     """
-    together: list[Store | Archive] = list(stores)
-    if len(stores) == 1 and isinstance(stores[0], Store) and stores[0].index().campaign.page.by_processor:
-        together = joined(stores[0], directory / archive.NAME)
-    results = gather(together)
+    if len(stores) == 1 and stores[0].index().campaign.page.by_processor:
+        stores = joined(stores[0], directory / PACKED)
+    results = gather(stores)
     document = page_of(results)
-    publish(document, directory, contents(document, together), stderr=stderr)
+    publish(document, directory, contents(document, results.runs, stores), stderr=stderr)
     return results
 
 
 def publish(
-    document: Document, directory: Path, contents: Contents | None = None, *, stderr: bool = True
+    document: Document, directory: Path, contents: Store | None = None, *, stderr: bool = True
 ) -> None:
-    """Write a report, with the archive of its contents, and say where it is.
+    """Write a report, with the store of its rows, and say where it is.
 
     Ends with exit code 1 where a part of it could not be made.
 
@@ -48,7 +43,7 @@ def publish(
     problems.errors.InputError
         If the directory cannot be written.
     """
-    beside = None if contents is None else {archive.NAME: archive.packed(contents)}
+    beside = None if contents is None else {PACKED: contents.packed()}
     for path in write(document, directory, beside):
         terminal.console(stderr=stderr).print(str(path), style="dim" if stderr else "")
     for part in document.failed:

@@ -6,8 +6,8 @@ from typing import Annotated
 
 import typer
 
-from hbvm_bench.store.archive import opened
 from hbvm_bench.store.files import ensure_writable
+from hbvm_bench.store.store import opened
 from problems.errors import InputError
 
 
@@ -32,7 +32,7 @@ def report(
         ),
     ] = None,
 ) -> None:
-    """Write the report of one or more runs: report.md, index.html, figures, archive; nothing is run again."""
+    """Write the report of one or more runs: report.md, index.html, figures, rows; nothing is run again."""
     if not runs and index is None and pages is None:
         raise InputError("give at least one run, as in runs/sitnikov, or --index DIR, or --pages DIR.")
     if runs:

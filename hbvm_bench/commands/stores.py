@@ -11,9 +11,8 @@ from rich.text import Text
 
 from hbvm_bench.report import terminal
 from hbvm_bench.store import merge as merging
-from hbvm_bench.store.archive import opened
 from hbvm_bench.store.files import ensure_writable
-from hbvm_bench.store.store import Store
+from hbvm_bench.store.store import Store, opened
 from hbvm_bench.summaries import compare as comparing
 from hbvm_bench.summaries import export as exporting
 from hbvm_bench.summaries.table import Table
@@ -85,7 +84,7 @@ def merge(
     cases, records, left_out = merging.merge(merging.stores(runs), Store(out))
     print(f"{records} of {cases} cases in {out}")
     if left_out:
-        print(f"{left_out} left out: damaged, or measured by another version of hbvm-bench; run them again")
+        print(f"{left_out} left out: damaged; run them again")
 
 
 def export(

@@ -17,7 +17,7 @@ from hbvm_bench.commands.listing import as_json as run_as_json
 from hbvm_bench.commands.run import as_typed, carry_out, refuse_died
 from hbvm_bench.measure import machine
 from hbvm_bench.report import terminal
-from hbvm_bench.store.files import ensure_writable, write_json
+from hbvm_bench.store.files import ensure_writable
 from hbvm_bench.store.store import Store
 from hbvm_bench.studies.race.families import FIXED, OURS, row_of
 from hbvm_bench.studies.race.probe import PROBES, Probe, probe
@@ -123,9 +123,9 @@ def _probe(campaign: Campaign, store: Store) -> None:
         h = float(parse_spec(ours.method).arguments["h"])
         fresh += probe(name_of(entry), ours.problem, h, families)
     names = {measured.problem for measured in fresh}
-    before = msgspec.convert(store.beside().get(PROBES, []), list[Probe])
+    before = msgspec.convert(store.studies().get(PROBES, []), list[Probe])
     kept = [*(measured for measured in before if measured.problem not in names), *fresh]
-    write_json(store.directory / f"{PROBES}.json", kept)
+    store.keep_study(PROBES, kept)
 
 
 def _declare(campaign: Campaign, *, error: bool) -> None:

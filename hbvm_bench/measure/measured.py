@@ -151,7 +151,7 @@ def _reversal(problem: Problem, result: Result, series: Series) -> float | str:
 def _drift(problem: Problem, series: Series) -> Series:
     """Return the errors that a growth is fitted to, shape (starts, n), and their times since the start."""
     if "starts.y0" not in series:
-        return _named(series, "drift.")  # of an archive, which has these errors instead of the states
+        return _named(series, "drift.")  # of a report, which has these errors instead of the states
     t = np.abs(series["t"] - problem.t0)
     starts = [problem.y0, *series["starts.y0"]]
     states = [series["y"], *series["starts.y"]]

@@ -1,11 +1,9 @@
 """Readings: errors, their growth and metrics, computed from the stored series by pure functions.
 
-A reading is kept beside the records, in ``readings/``, until the record, its reference, or a source that
-makes it changes; a change makes it anew and runs no integration.
+A reading is kept in the user's cache under a digest of all that it depends on: the record, its reference, and
+the sources that make it; a change makes it anew and runs no integration.
 """
 
-import hashlib
-from contextlib import suppress
 from functools import cache
 
 import msgspec
@@ -14,13 +12,13 @@ from hbvm_bench.campaign.identity import digest_of, make_problem
 from hbvm_bench.measure import measured, metrics
 from hbvm_bench.measure.measured import Measured, Series
 from hbvm_bench.reference import solutions
-from hbvm_bench.store.archive import Archive
 from hbvm_bench.store.records import Reading, Record
-from hbvm_bench.store.store import Store, damage
+from hbvm_bench.store.store import Store
+from integrators.kernel.native import store as kept
 from problems.errors import InputError
 
 
-def records(store: Store | Archive) -> list[Record]:
+def records(store: Store) -> list[Record]:
     """Return the records of a run as `Store.records` does, with their readings.
 
     Raises
@@ -28,32 +26,33 @@ def records(store: Store | Archive) -> list[Record]:
     problems.errors.InputError
         If the directory holds no run.
     """
-    stored = store.records()
-    return stored if isinstance(store, Archive) else [up_to_date(store, record) for record in stored]
+    return [up_to_date(store, record) for record in store.records()]
 
 
 def up_to_date(store: Store, record: Record) -> Record:
     """Return a record of a store with its reading: the one that is kept, or a new one, which is then kept."""
     if record.result.outcome not in ("ok", "stalled") or record.result.metrics:
         return record
-    reading = store.reading(record.id)
     try:
         reference = solutions.digest(make_problem(record.case.problem))
     except InputError:  # of a plugin that is not here
-        return record if reading is None else with_reading(record, reading)
-    content = msgspec.json.encode([rule(), reference, record.id, record.finished, record.timing])
-    digest = hashlib.sha256(content).hexdigest()
-    if reading is None or reading.digest != digest:
+        return record
+    content = msgspec.json.encode([reference, record])
+    arrays = (part for named in store.packed_series(record.id).items() for part in named)
+    key = kept.key("reading", rule(), content, *arrays)
+    if (known := kept.get(key)) is not None:
+        return with_reading(record, msgspec.json.decode(known, type=Reading))
+    try:
         reread = read(record, store.series(record.id))
-        reading = Reading(
-            metrics=reread.result.metrics,
-            violation=reread.result.violation,
-            growth=reread.result.growth,
-            digest=digest,
-        )
-        with suppress(InputError, OSError):  # where nothing can be written it is read again next time
-            store.keep_reading(record.id, reading)
-    return with_reading(record, reading)
+    except (LookupError, ValueError, TypeError) as error:
+        raise InputError(
+            f"the arrays of {record.case.method} on {record.case.problem} cannot be read "
+            f"({type(error).__name__}: {error}); {store.again()}."
+        ) from error
+    result = reread.result
+    reading = Reading(metrics=result.metrics, violation=result.violation, growth=result.growth)
+    kept.put(key, msgspec.json.encode(reading))
+    return reread
 
 
 def read(record: Record, series: Series) -> Record:
@@ -73,12 +72,11 @@ def read(record: Record, series: Series) -> Record:
 def case_of(record: Record, series: Series) -> Measured | None:
     """Return what is measured on a case, without error growth; ``None`` where it has no trajectory.
 
-    A case that was read by an earlier version, which kept too little to read it again, has none either.
+    A row of a report has been read, and has only what is drawn of it.
     """
-    problem = make_problem(record.case.problem)
-    unusable = record.result.outcome not in ("ok", "stalled") or damage(record, series, problem.system.dim)
-    if unusable or is_read(series):
+    if record.result.outcome not in ("ok", "stalled") or record.result.metrics or "y" not in series:
         return None
+    problem = make_problem(record.case.problem)
     known = solutions.find(problem)
     asked = record.case.ensemble
     return measured.measure(problem, record.result, series, known, record.timing, ensemble=asked)
@@ -88,11 +86,6 @@ def drawn(record: Record, series: Series) -> Series:
     """Return the series that figures are drawn from: errors, distances and positions beside the states."""
     case_measured = case_of(record, series)
     return series if case_measured is None else case_measured.series()
-
-
-def is_read(series: Series) -> bool:
-    """Whether these series are a reading of an earlier version, and not what a worker returned."""
-    return "distance" in series
 
 
 def with_reading(record: Record, reading: Reading) -> Record:

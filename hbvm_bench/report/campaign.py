@@ -12,7 +12,6 @@ from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.measure.metrics import METRICS
 from hbvm_bench.reference import solutions
 from hbvm_bench.report import provenance, words
-from hbvm_bench.report.archived import PLACE
 from hbvm_bench.report.document import (
     Block,
     CaseTable,
@@ -27,8 +26,9 @@ from hbvm_bench.report.document import (
 from hbvm_bench.report.figures.profiles import profiles
 from hbvm_bench.report.page import DRAWN_CASES, Results, block
 from hbvm_bench.report.problem import ProblemPart, part
-from hbvm_bench.store import archive
+from hbvm_bench.report.stored import PLACE
 from hbvm_bench.store.records import Record
+from hbvm_bench.store.store import PACKED
 from hbvm_bench.summaries import accuracies, compilations, goals, growth, needs, outcomes
 from hbvm_bench.summaries.points import by_family, family_of
 from hbvm_bench.summaries.rows import Task, columns, grouped_by, tasks
@@ -41,7 +41,7 @@ BRIEF_CASES = 150
 PROBLEMS_SUMMARIZED_AT_TOP = 3  # problems whose summaries all stand at the top
 LISTED = 12  # cases without a rank that are listed at once; more are folded away
 ALL = (
-    "Every case with every metric, every reason and every timing sample, as compressed JSON; "
+    "Every case with every metric, every reason and every timing sample, as a compressed SQLite file; "
     "`hbvm-bench export` makes tables of it"
 )
 CITE = "`hbvm-bench cite` prints how the authors of the methods ask to be cited."
@@ -144,9 +144,9 @@ def problems_in_turn(results: Results) -> list[Section]:
 
 @block
 def raw_data(results: Results) -> Section:
-    """Return where the archive lies."""
+    """Return where the rows lie."""
     del results
-    return Section("Raw data", [Files(ALL, [archive.NAME])], "data-files", nav="Data")
+    return Section("Raw data", [Files(ALL, [PACKED])], "data-files", nav="Data")
 
 
 @block

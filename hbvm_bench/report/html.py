@@ -15,7 +15,6 @@ from markupsafe import Markup, escape
 
 from hbvm_bench.measure.metrics import Metric
 from hbvm_bench.report import pack
-from hbvm_bench.report.archived import PLACE
 from hbvm_bench.report.document import (
     VERDICTS,
     Block,
@@ -28,6 +27,7 @@ from hbvm_bench.report.document import (
 )
 from hbvm_bench.report.figures.canvas import Picture, inline_svg
 from hbvm_bench.report.figures.style import DARK_NEUTRALS, NEUTRALS, Look
+from hbvm_bench.report.stored import PLACE
 from hbvm_bench.summaries.rows import Cell, Row, seconds
 
 HERE = "hbvm_bench.report"

@@ -11,9 +11,9 @@ from hbvm_bench.report import provenance
 from hbvm_bench.report.html import pages
 from hbvm_bench.report.markdown import plain, printed
 from hbvm_bench.report.page import document
-from hbvm_bench.store import archive
 from hbvm_bench.store.files import write_all
 from hbvm_bench.store.records import Record
+from hbvm_bench.store.store import PACKED, Store
 from hbvm_bench.store.stored_run import StoredRun
 from hbvm_bench.summaries import outcomes
 from hbvm_bench.summaries.table import Table
@@ -34,7 +34,7 @@ RACE, AVX2 = "race", "-avx2"  # how the kind of a processor ends, where code was
 
 
 def write_pages(directory: Path) -> Iterator[Path]:
-    """Draw ``index.html`` of every report in a directory from its archive, and yield its path.
+    """Draw ``index.html`` of every report in a directory from its stored rows, and yield its path.
 
     Raises
     ------
@@ -42,9 +42,9 @@ def write_pages(directory: Path) -> Iterator[Path]:
         If what is stored is damaged, or a directory cannot be written.
     """
     for folder in sorted(path for path in directory.iterdir() if path.is_dir()):
-        if (folder / archive.NAME).is_file():
+        if (folder / PACKED).is_file():
             path = folder / "index.html"
-            files = pages(document(archive.read(folder / archive.NAME)), folder)
+            files = pages(document(Store(folder / PACKED).runs()), folder)
             write_all({folder / name: text.encode() for name, text in files.items()})
             yield path
 
@@ -83,10 +83,10 @@ def conditions(directory: Path) -> Table:
     """
     rows = []
     for folder in sorted(path for path in directory.iterdir() if _document(path)):
-        if not (folder / archive.NAME).is_file():
+        if not (folder / PACKED).is_file():
             rows.append((folder.name, *["not recorded"] * 5))
             continue
-        runs = [run.records() for run in archive.read(folder / archive.NAME)]
+        runs = [run.records() for run in Store(folder / PACKED).runs()]
         rows += [(folder.name, *_measured(records)) for records in runs if records]
     return Table(
         "",
@@ -114,7 +114,7 @@ def not_measured(directory: Path) -> list[str]:
         if name not in CHECKS and not _document(directory / name)
     ]
     if _document(directory / RACE):
-        everywhere, on_avx2 = _race_problems(directory / RACE / archive.NAME)
+        everywhere, on_avx2 = _race_problems(directory / RACE / PACKED)
         without = [problem for problem in everywhere if problem not in on_avx2]
         if without or not on_avx2:
             which = f": {', '.join(without)}" if on_avx2 else ""
@@ -123,9 +123,9 @@ def not_measured(directory: Path) -> list[str]:
 
 
 def _race_problems(path: Path) -> tuple[list[str], list[str]]:
-    """Return the problems with results in an archive, without and with code restricted to AVX2."""
+    """Return the problems with results in a report, without and with code restricted to AVX2."""
     problems: tuple[list[str], list[str]] = ([], [])
-    for run in archive.read(path) if path.is_file() else []:
+    for run in Store(path).runs() if path.is_file() else []:
         if records := run.records():
             restricted = machine.kind(StoredRun.machine_of(records)).endswith(AVX2)
             problems[restricted].extend(dict.fromkeys(record.case.problem for record in records))

@@ -12,25 +12,22 @@ from importlib import import_module
 from typing import TypeVar
 
 import numpy as np
-from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from hbvm_bench.campaign.file import Case, Page
-from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.measure import machine, reading
-from hbvm_bench.report.archived import pictures
 from hbvm_bench.report.document import Block, Document, attempt
 from hbvm_bench.report.figures.canvas import Picture
 from hbvm_bench.report.figures.style import Look, looks
-from hbvm_bench.store.archive import Archive, Drawing
+from hbvm_bench.report.stored import pictures
 from hbvm_bench.store.records import Record
-from hbvm_bench.store.store import Store, again, damage, progress
+from hbvm_bench.store.store import Store, progress
 from hbvm_bench.store.stored_run import StoredRun
 from hbvm_bench.summaries.points import family_of
 from problems.errors import InputError, unknown
 
 Series = dict[str, NDArray[np.float64]]
-Stores = Sequence[Store] | Sequence[Archive] | Sequence[Store | Archive]
+Stores = Sequence[Store]
 Made = Block | Sequence[Block] | None
 
 DRAWN_CASES = 300  # of a larger campaign the first so many are drawn: a figure takes seconds
@@ -60,9 +57,9 @@ class Results:
     records : list of Record
         Of all cases; of one that several runs have, that of the run that got further with it.
     series : dict
-        What is drawn of each case, by its id; empty where an archive has drawings instead.
-    drawings : sequence of Drawing
-        Of an archive.
+        What is drawn of each case, by its id; empty where a report has figures instead.
+    figures : sequence of (str, str)
+        Of a report; see `Store.figures`.
     beside : dict
         What a study keeps beside its cases, by name.
     """
@@ -70,7 +67,7 @@ class Results:
     runs: list[StoredRun]
     records: list[Record]
     series: dict[str, Series]
-    drawings: Sequence[Drawing] = ()
+    figures: Sequence[tuple[str, str]] = ()
     beside: dict[str, object] = field(default_factory=dict)
 
     @property
@@ -99,8 +96,8 @@ class Results:
         return dict(sorted(runs_of.items()))
 
     def drawn(self, place: str) -> list[Picture]:
-        """Return the figures of a section as an archive has them."""
-        return pictures(self.drawings, place)
+        """Return the figures of a section as a report has them."""
+        return pictures(self.figures, place)
 
 
 BlockMaker = Callable[[Results], Made]
@@ -139,7 +136,7 @@ def _names() -> list[str]:
 
 
 def gather(stores: Stores) -> Results:
-    """Read the stores of one or more runs, or the runs of an archive.
+    """Read the stores of one or more runs.
 
     A case that several runs have is taken from the run that is more complete
     (`hbvm_bench.store.store.progress`).
@@ -151,7 +148,7 @@ def gather(stores: Stores) -> Results:
     """
     indices = [store.index() for store in stores]
     runs = []
-    furthest: dict[str, tuple[Record, Store | Archive]] = {}
+    furthest: dict[str, tuple[Record, Store]] = {}
     for store, index in zip(stores, indices, strict=True):
         runs.append(StoredRun(index=index, records=reading.records(store)))
         for record in runs[-1].records:
@@ -160,7 +157,7 @@ def gather(stores: Stores) -> Results:
     if not furthest:
         raise InputError(
             f"none of the {sum(len(index.ids) for index in indices)} cases of the run in "
-            f"{str(stores[0].directory)!r} has finished; {again(indices[0], stores[0].directory)}."
+            f"{str(stores[0].directory)!r} has finished; {stores[0].again()}."
         )
     series: dict[str, Series] = {}
     records: list[Record] = []
@@ -169,14 +166,10 @@ def gather(stores: Stores) -> Results:
         if store is not last:
             store.add_known()  # of two runs each may have a reference of its own
             last = store
-        reread, series[key] = record, {}
-        if isinstance(store, Archive):
-            series[key] = store.series(key)
-        elif number < DRAWN_CASES:
-            reread, series[key] = _read(record, store)
-        records.append(reread)
-    beside = {name: value for store in stores for name, value in store.beside().items()}
-    return Results(runs, records, series, _drawings(stores), beside)
+        series[key] = reading.drawn(record, store.series(key)) if number < DRAWN_CASES else {}
+        records.append(record)
+    beside = {name: value for store in stores for name, value in store.studies().items()}
+    return Results(runs, records, series, stores[0].figures(), beside)
 
 
 def document(stores: Store | Stores) -> Document:
@@ -198,19 +191,3 @@ def page_of(results: Results) -> Document:
         list(results.look.values()),
         name=page.name,
     )
-
-
-def _drawings(stores: Stores) -> Sequence[Drawing]:
-    """Return the figures that an archive has in the place of series; its runs have them in common."""
-    return next((store.drawings for store in stores if isinstance(store, Archive)), ())
-
-
-def _read(record: Record, store: Store) -> tuple[Record, Series]:
-    """Return a record and its series; where these are damaged, none and a remark."""
-    series = store.series(record.id)
-    why = damage(record, series, make_problem(record.case.problem).system.dim)
-    if not why:
-        return record, reading.drawn(record, series)
-    said = f"its series in the store are damaged ({why}): not drawn"
-    note = "; ".join(text for text in (record.case.note, said) if text)
-    return replace(record, case=replace(record.case, note=note)), {}

@@ -10,7 +10,7 @@ from hbvm_bench.campaign.identity import Resolved, resolve
 from hbvm_bench.run.executors import Pool
 from hbvm_bench.run.task import InterruptedRunError, UnfinishedRunError, execute, task_of
 from hbvm_bench.store.records import COMPILING, DIED, Record, decoded
-from hbvm_bench.store.store import Store, damage, is_of
+from hbvm_bench.store.store import Store
 from problems.errors import InputError
 
 ATTEMPTS = 3  # of a case whose process dies, or that an executor loses with the machine that had it
@@ -48,11 +48,8 @@ def died(record: Record) -> bool:
 
 
 def is_kept(resolved: Resolved, store: Store, limits: Limits) -> bool:
-    """Whether the store has a case as a run under these limits leaves it, its series with it."""
-    record = store.load(resolved.id)
-    if record is None or not is_of(record.case, resolved.case) or not is_done(record, limits):
-        return False
-    return not damage(record, store.series(resolved.id), resolved.problem.system.dim)
+    """Whether the store has a case as a run under these limits leaves it."""
+    return is_done(store.load(resolved.id), limits)
 
 
 def run_accuracy(

@@ -29,9 +29,8 @@ from hbvm_bench.reference import solutions
 from hbvm_bench.run import ending, supervise, warm
 from hbvm_bench.run.supervise import Ended
 from hbvm_bench.run.worker import COMPILED, ENVIRONMENT, NO_ROOM, REPLY, STALE, Request
-from hbvm_bench.store import records
+from hbvm_bench.store import arrays, records
 from hbvm_bench.store.records import COMPILING, DIED, Outcome, Record, Result
-from hbvm_bench.store.store import decode_series
 from problems.errors import InputError
 
 T = TypeVar("T")
@@ -76,7 +75,7 @@ def execute(task: bytes) -> tuple[bytes, bytes]:
     record : bytes
         JSON of a `Record`: whatever happens to the process is one, with its reason.
     series : bytes
-        As `hbvm_bench.store.store.encode_series` makes them; empty where there are none.
+        As `hbvm_bench.store.arrays.encode` makes them; empty where there are none.
 
     Raises
     ------
@@ -235,7 +234,8 @@ def _result(scratch: Path, ended: Ended, limits: Limits) -> tuple[Result, bytes]
     if result.outcome not in ("ok", "stalled"):
         return result, b""
     try:
-        series = (scratch / "series.npz").read_bytes()
-    except FileNotFoundError:
+        series = (scratch / "arrays").read_bytes()
+        arrays.decode(series)
+    except (FileNotFoundError, ValueError):
         return failed("crashed", NO_RESULT, DIED)
-    return (result, series) if decode_series(series) else failed("crashed", NO_RESULT, DIED)
+    return result, series

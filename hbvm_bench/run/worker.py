@@ -1,6 +1,6 @@
 """The process that runs one case: ``python -m hbvm_bench.run.worker REQUEST.json PARENT``, or a warm one.
 
-It writes ``reply.json``, a `Result` (with ``series.npz``) or a list of `Timing`, beside the
+It writes ``reply.json``, a `Result` (with ``arrays``) or a list of `Timing`, beside the
 request and leaves the store alone; whatever happens to it, the runner that
 started it says what.
 """
@@ -23,9 +23,9 @@ from hbvm_bench.measure import batch, ensemble, machine, memory, raw, timing
 from hbvm_bench.measure.raw import Series
 from hbvm_bench.measure.timing import SingleRun, Timeable
 from hbvm_bench.run import ending
+from hbvm_bench.store.arrays import NAME, encode
 from hbvm_bench.store.files import atomic
 from hbvm_bench.store.records import Result, Timing
-from hbvm_bench.store.store import NAME, encode_series
 from integrators.protocol import PreparedBatches, Program, Status, offers
 from integrators.solution import Solution
 from problems.errors import InputError
@@ -162,8 +162,8 @@ def _chaos(resolved: Resolved) -> tuple[dict[str, str], Series]:
 
 
 def _stored(directory: Path, result: Result, series: Series) -> Result:
-    with atomic(directory / "series.npz") as temporary:
-        temporary.write_bytes(encode_series(series))
+    with atomic(directory / "arrays") as temporary:
+        temporary.write_bytes(encode(series))
     return result
 
 

@@ -59,12 +59,6 @@ def _as_text(cell: object) -> object:
     return cell
 
 
-def write_json(path: Path, value: Any) -> None:
-    """Write a value as JSON, all of it or nothing."""
-    with atomic(path) as temporary:
-        temporary.write_bytes(json_of(value))
-
-
 def write_all(files: Mapping[Path, bytes]) -> None:
     """Write files that belong together: all of them or, as far as it can be helped, none.
 

@@ -8,7 +8,7 @@ from typing import TypeVar
 import msgspec
 
 from hbvm_bench.campaign.file import Campaign, Case
-from hbvm_bench.store.store import INDEX, Index, Store, progress
+from hbvm_bench.store.store import Index, Store, progress
 from problems.errors import InputError
 
 T = TypeVar("T")
@@ -25,14 +25,14 @@ def merge(runs: Sequence[Store], out: Store) -> tuple[int, int, int]:
     -------
     cases, records, left_out : int
         How many there are now, how many of them have run, and how many have only records that are
-        damaged or of another version.
+        damaged.
 
     Raises
     ------
     problems.errors.InputError
         If a directory holds no run, or ``out`` holds one.
     """
-    if (out.directory / INDEX).exists():
+    if out.path.exists():
         raise InputError(f"{str(out.directory)!r} holds a run already; merge into a new directory.")
     indices = [run.index() for run in runs]
     cases: dict[str, Case] = {}
@@ -46,7 +46,7 @@ def merge(runs: Sequence[Store], out: Store) -> tuple[int, int, int]:
             copies = [(record, run) for run in runs if (record := run.load(case_id)) is not None]
             if copies:
                 record, run = max(copies, key=lambda pair: progress(pair[0]))
-                out.save(record, run.series_file(case_id) or None)
+                out.save(record, run.packed_series(case_id) or None)
                 written += 1
             else:
                 left_out += any(run.has(case_id) for run in runs)

@@ -17,11 +17,10 @@ from hbvm_bench.campaign.file import Case
 from problems.errors import printable
 
 T = TypeVar("T")
-SCHEMA = 2  # 1 had position errors in units of length
 COMPILING = "compiling"  # the status of a timeout before a case began
 DIED = "died"  # the status of a case whose process ended without an answer: it says nothing final of the case
 
-Outcome = Literal["ok", "stalled", "timeout", "killed", "crashed", "refused", "damaged", "outdated"]
+Outcome = Literal["ok", "stalled", "timeout", "killed", "crashed", "refused"]
 
 
 def decoded(content: bytes, type_: type[T]) -> T:
@@ -264,7 +263,7 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
     ----------
     outcome : str
         ``ok``, ``stalled``, ``refused`` or ``crashed``; ``timeout`` and ``killed`` are seen from
-        outside, and ``damaged`` or ``outdated`` is said of a record that the store cannot use.
+        outside.
     status : str
         The solution's own status; empty without a solution, but for `COMPILING` and `DIED`.
     reason : str
@@ -276,7 +275,7 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
     metrics, growth, violation
         What is computed from the series: metrics, how the error of each invariant grows, and where a symmetry
         guard says that this is another trajectory than the one asked for. Empty as a worker returns it and
-        as the store keeps it; `hbvm_bench.measure.reading` fills them.
+        as a run's store keeps it: `hbvm_bench.measure.reading` fills them. The store of a report has them.
     warnings : list of str
         What the solution says of itself although it did not fail.
     reversal : Value
@@ -307,18 +306,11 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Reading(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """What was computed from the series of a case; see `Result` for the first three.
-
-    Attributes
-    ----------
-    digest : str
-        Digest of all that it depends on; see `hbvm_bench.measure.reading`.
-    """
+    """What was computed from the series of a case; see `Result`."""
 
     metrics: dict[str, Value] = {}
     violation: str = ""
     growth: dict[str, ErrorGrowth] = msgspec.field(default_factory=dict, name="laws")
-    digest: str = msgspec.field(default="", name="by")
 
 
 class Record(msgspec.Struct, frozen=True, kw_only=True):
@@ -364,7 +356,6 @@ class Record(msgspec.Struct, frozen=True, kw_only=True):
     machine: dict[str, str | int] = {}
     finished: str = ""
     kernel: str = ""
-    schema: int = SCHEMA
 
     def __post_init__(self) -> None:
         if self.finished:

@@ -1,52 +1,66 @@
-"""The store: one atomic JSON file per case, its series beside it, and an index.
+"""The store of a run: one SQLite file with a row for every case and its arrays.
 
 ::
 
-    DIR/campaign.json        what was asked for: the campaign and the ids of its cases
-    DIR/cases/<id>.json      one record per case
-    DIR/cases/<id>.npz       its series, as the integration gave them; see `hbvm_bench.measure.raw`
-    DIR/readings/<id>.json   what was computed from them last; see `hbvm_bench.measure.reading`
-    DIR/problems/<name>.json what is known of a problem that does not come with the package, or its reference
+    runs       what was asked for: the campaign and the ids of its cases
+    results    one row per case: its `Record` as JSON, and the columns that one looks for
+    arrays     those of a case by name, compressed ``.npy``; see `hbvm_bench.measure.raw`
+    problems   what is known of a problem that does not come with the package, or its reference
+    studies    what a study computed beside its cases
+    figures    of a report: those whose arrays it does not keep
 
-A file is complete or not there, so that the store is also the cache: a rerun
-does what is missing. Nothing is pickled.
+The runner alone writes. A row and its arrays are one transaction, so that the end of a process at any moment
+loses and doubles nothing, and a rerun does what is missing. ``runs/NAME`` has ``results.sqlite`` with all
+arrays; beside a report lies ``results.sqlite.xz``, with the rows as they were read, of one or several
+machines, and those arrays that its page asks for. Nothing is pickled.
 """
 
-import hashlib
-import io
-import math
-import re
+import lzma
 import shlex
-import time
-import zipfile
-from collections.abc import Callable, Iterator, Mapping
+import sqlite3
+import weakref
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
-from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any
 
 import msgspec
 import numpy as np
+import psutil
 from numpy.typing import NDArray
 
 from hbvm_bench.campaign import own
 from hbvm_bench.campaign.file import Campaign, Case, Goal
-from hbvm_bench.campaign.identity import make_method, make_problem, of_method
-from hbvm_bench.campaign.spec import Spec, parse_spec
+from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.reference import solutions
-from hbvm_bench.store.files import atomic, ensure_writable, write_json
-from hbvm_bench.store.records import SCHEMA, Outcome, Reading, Record, Result, decoded
+from hbvm_bench.store import arrays as packing
+from hbvm_bench.store.files import ensure_writable
+from hbvm_bench.store.records import Record, decoded
 from problems import limits, locks
 from problems.errors import InputError
 
-INDEX = "campaign.json"
-CASES = "cases"
-READINGS = "readings"
-PROBLEMS = "problems"
-NAME_LENGTH = 24  # of the 64 digits of an id; 96 bits
-NAME = re.compile(r"\w[\w .-]{0,99}")
-SERIES = ("t", "y")  # every trajectory has them
-FORGOTTEN = 3600.0  # seconds after which a half-written file has nobody who writes it
+FILE, PACKED = "results.sqlite", "results.sqlite.xz"
+VERSION = 3
+FORMER = ("campaign.json", "results.json.xz")  # of version 0.1
+SHARED = ("nfs", "cifs", "smb", "fuse", "9p", "lustre", "gpfs", "beegfs", "ceph", "afs")
+"""How file systems of a network are called, whose machines share no memory, which a write-ahead log needs."""
+
+TABLES = """
+CREATE TABLE runs (run INTEGER PRIMARY KEY, asked TEXT NOT NULL);
+CREATE TABLE results (
+    run INTEGER NOT NULL, id TEXT NOT NULL, problem TEXT NOT NULL, method TEXT NOT NULL,
+    library TEXT NOT NULL, outcome TEXT NOT NULL, status TEXT NOT NULL, finished TEXT NOT NULL,
+    record TEXT NOT NULL,
+    PRIMARY KEY (run, id));
+CREATE TABLE arrays (
+    run INTEGER NOT NULL, id TEXT NOT NULL, name TEXT NOT NULL, data BLOB NOT NULL,
+    PRIMARY KEY (run, id, name));
+CREATE TABLE problems (run INTEGER NOT NULL, problem TEXT NOT NULL, known TEXT NOT NULL,
+    PRIMARY KEY (run, problem));
+CREATE TABLE studies (name TEXT PRIMARY KEY, content TEXT NOT NULL);
+CREATE TABLE figures (place TEXT NOT NULL, number INTEGER NOT NULL, picture TEXT NOT NULL,
+    PRIMARY KEY (place, number));
+"""
 
 
 class Index(msgspec.Struct, frozen=True, kw_only=True):
@@ -67,45 +81,60 @@ class Index(msgspec.Struct, frozen=True, kw_only=True):
     """
 
     campaign: Campaign
-    ids: list[Annotated[str, msgspec.Meta(pattern="^[0-9a-f]{64}$")]]  # they are file names, too
+    ids: list[Annotated[str, msgspec.Meta(pattern="^[0-9a-f]{64}$")]]
     version: str
     command: str
     cases: list[Case] = []
-    schema: int = SCHEMA
 
     def listed(self) -> list[tuple[str, Case]]:
         """Return the ids with their cases, in order."""
         return list(zip(self.ids, self.cases or self.campaign.cases(), strict=True))
 
 
-class _Version(msgspec.Struct):
-    schema: int = SCHEMA
-
-
-class OtherVersionError(ValueError):
-    """A record is sound, but an earlier or later version of this package wrote it."""
-
-
 class Store:
-    """Records and series in a directory; see the module's text."""
+    """The rows and arrays of one run in a file; see the module's text.
 
-    def __init__(self, directory: Path) -> None:
-        self.directory = Path(directory)
-        self.cases = self.directory / CASES
+    Parameters
+    ----------
+    place : Path, optional
+        A directory, in which the file is `FILE`, or `PACKED` where there is only that; or such a file.
+        ``None`` for a store in memory, which `packed` returns as bytes.
+    run : int
+        Which of its runs; only a report has several.
+    """
+
+    def __init__(self, place: Path | None = None, run: int = 1) -> None:
+        self.directory = Path(place or "memory")
+        self.run = run
+        self._open: sqlite3.Connection | None = None
+        self._owner: Store | None = None  # of the connection, which is closed with it
+        if place is None:
+            self._keep_open(sqlite3.connect(":memory:"))
+            self._database.executescript(TABLES)
+
+    @property
+    def path(self) -> Path:
+        """Where the file is, or will be."""
+        if self.directory.is_file():
+            return self.directory
+        path, packed = self.directory / FILE, self.directory / PACKED
+        return packed if packed.is_file() and not path.is_file() else path
 
     def prepare(self) -> None:
-        """Make the directories, or refuse a place that cannot be written.
+        """Make the file, or refuse a place that cannot be written.
 
         Raises
         ------
         problems.errors.InputError
             If nothing can be written there; nothing is left behind.
         """
-        ensure_writable(self.cases)
-        for path in self.cases.glob(".*.part"):  # of a runner that was killed while it wrote
-            with suppress(FileNotFoundError):
-                if time.time() - path.stat().st_mtime > FORGOTTEN:
-                    path.unlink()
+        ensure_writable(self.directory)
+        with self._told():
+            if not self.path.is_file():
+                self._keep_open(sqlite3.connect(self.path))
+                self._database.executescript(f"BEGIN; {TABLES} PRAGMA user_version={VERSION}; COMMIT;")
+            self._database.execute(f"PRAGMA journal_mode={_journal(self.directory)}")
+            self._database.execute("PRAGMA synchronous=NORMAL")
 
     @contextmanager
     def locked(self) -> Iterator[None]:
@@ -126,78 +155,121 @@ class Store:
                 ) from None
             except OSError:  # a file system without locks; two runs there repeat work but harm nothing
                 pass
-            yield
+            try:
+                yield
+            finally:
+                with suppress(sqlite3.Error):  # one file remains, unless somebody reads it now
+                    self._database.execute("PRAGMA journal_mode=DELETE")
 
     def load(self, case_id: str) -> Record | None:
         """Return the record of a case, or ``None`` if it is missing or unreadable."""
-        try:
-            return self._read(case_id)
-        except (OSError, ValueError):
+        if self._open is None and not self.path.is_file():
             return None
+        for (text,) in self._rows("SELECT record FROM results WHERE run=? AND id=?", case_id):
+            with suppress(ValueError):
+                return decoded(text.encode(), Record)
+        return None
 
     def has(self, case_id: str) -> bool:
         """Whether there is a record of a case, be it readable or not."""
-        return self._record_path(case_id).exists()
+        return bool(self._rows("SELECT 1 FROM results WHERE run=? AND id=?", case_id))
 
-    def save(self, record: Record, series: Mapping[str, NDArray[np.float64]] | bytes | None = None) -> None:
-        """Store a record, its series first so that a record never lacks them."""
-        if series is not None:
-            encoded = series if isinstance(series, bytes) else encode_series(series)
-            with atomic(self._series_path(record.id)) as path:
-                path.write_bytes(encoded)
-        write_json(self._record_path(record.id), record)
+    def save(
+        self,
+        record: Record,
+        arrays: Mapping[str, NDArray[np.float64]] | Mapping[str, bytes] | bytes | None = None,
+        *,
+        compress: bool = True,
+    ) -> None:
+        """Store a record, and its arrays in the same transaction; those that it has stay without.
+
+        Arrays are not compressed for a file that is compressed as a whole.
+        """
+        result, text = record.result, msgspec.json.encode(record).decode()
+        row = (self.run, record.id, record.case.problem, record.case.method, record.library)
+        row += (result.outcome, result.status, record.finished, text)
+        if isinstance(arrays, bytes):
+            arrays = packing.decode(arrays) if arrays else None
+        with self._writing() as database:
+            database.execute("INSERT OR REPLACE INTO results VALUES (?,?,?,?,?,?,?,?,?)", row)
+            if arrays is not None:
+                database.execute("DELETE FROM arrays WHERE run=? AND id=?", (self.run, record.id))
+                blobs = (
+                    (name, data if isinstance(data, bytes) else packing.packed(data, compress=compress))
+                    for name, data in arrays.items()
+                )
+                rows = ((self.run, record.id, *blob) for blob in blobs)
+                database.executemany("INSERT INTO arrays VALUES (?,?,?,?)", rows)
 
     def series(self, case_id: str) -> dict[str, NDArray[np.float64]]:
-        """Return the series of a case by name; empty where it has none."""
-        return decode_series(self.series_file(case_id))
+        """Return the arrays of a case by name; empty where it has none.
 
-    def series_file(self, case_id: str) -> bytes:
-        """Return the ``.npz`` file of a case as it is; empty where it has none, or none that can be read."""
+        Raises
+        ------
+        problems.errors.InputError
+            If one is damaged.
+        """
         try:
-            return self._series_path(case_id).read_bytes()
-        except OSError:
-            return b""
+            return {name: packing.unpacked(data) for name, data in self.packed_series(case_id).items()}
+        except ValueError as error:
+            raise InputError(f"{str(self.path)!r} is damaged: {error}; {self.again()}.") from None
 
-    def reading(self, case_id: str) -> Reading | None:
-        """Return what was computed from a case last, or ``None``."""
-        try:
-            return decoded(self._reading_path(case_id).read_bytes(), Reading)
-        except (OSError, ValueError):
-            return None
-
-    def keep_reading(self, case_id: str, reading: Reading) -> None:
-        """Store what was computed from a case; it is made again from the series where it is lost."""
-        path = self._reading_path(case_id)
-        path.parent.mkdir(exist_ok=True)
-        with atomic(path) as temporary:
-            temporary.write_bytes(msgspec.json.encode(reading))
+    def packed_series(self, case_id: str) -> dict[str, bytes]:
+        """Return the arrays of a case as they are stored, by name."""
+        rows = self._rows("SELECT name, data FROM arrays WHERE run=? AND id=? ORDER BY rowid", case_id)
+        return {name: data for name, data in rows if packing.NAME.fullmatch(name)}
 
     def write_index(self, index: Index) -> None:
         """Store what the run was asked to do, and its problems where they do not come with the package."""
         for text in dict.fromkeys(case.problem for _, case in index.listed()):
             with suppress(InputError):  # of a plugin that is not here
                 self.keep(text)
-        write_json(self.directory / INDEX, index)
+        with self._writing() as database:
+            asked = msgspec.json.encode(index).decode()
+            database.execute("INSERT OR REPLACE INTO runs VALUES (?,?)", (self.run, asked))
 
     def keep(self, text: str) -> None:
         """Store the formula of a problem of the user's own, and a reference that was made here."""
         known = own.beside(make_problem(text))
         if known != own.Beside():
-            name = hashlib.sha256(text.encode()).hexdigest()[:NAME_LENGTH]
-            (self.directory / PROBLEMS).mkdir(parents=True, exist_ok=True)
-            write_json(self.directory / PROBLEMS / f"{name}.json", known)
+            row = self.run, text, msgspec.json.encode(known).decode()
+            with self._writing() as database:
+                database.execute("INSERT OR REPLACE INTO problems VALUES (?,?,?)", row)
 
     def add_known(self) -> None:
         """Know the problems and references that are stored here, and no other run's; no code is run."""
         solutions.forget()
-        for path in (self.directory / PROBLEMS).glob("[!.]*.json"):
-            with suppress(OSError, ValueError, LookupError, TypeError):  # damaged: whoever needs it says so
-                own.add_known(decoded(path.read_bytes(), own.Beside))
+        if self._open is None and not self.path.is_file():
+            return
+        for (text,) in self._rows("SELECT known FROM problems WHERE run=?"):
+            with suppress(ValueError, LookupError, TypeError):  # damaged: whoever needs it says so
+                own.add_known(decoded(text.encode(), own.Beside))
+
+    def keep_study(self, name: str, content: object) -> None:
+        """Store what a study computed beside its cases: JSON."""
+        with self._writing() as database:
+            row = name, msgspec.json.encode(content).decode()
+            database.execute("INSERT OR REPLACE INTO studies VALUES (?,?)", row)
+
+    def studies(self) -> dict[str, Any]:
+        """Return what studies computed beside the cases, by name."""
+        rows = self._all("SELECT name, content FROM studies ORDER BY name")
+        return {name: decoded(text.encode(), object) for name, text in rows}
+
+    def keep_figure(self, place: str, picture: str) -> None:
+        """Store a figure of a part of a report's page."""
+        with self._writing() as database:
+            (count,) = database.execute("SELECT count(*) FROM figures WHERE place=?", (place,)).fetchone()
+            database.execute("INSERT INTO figures VALUES (?,?,?)", (place, count, picture))
+
+    def figures(self) -> list[tuple[str, str]]:
+        """Return the figures of a report's page, each with the part that it stands in."""
+        return self._all("SELECT place, picture FROM figures ORDER BY rowid")
 
     def goals(self) -> list[Goal]:
         """Return the goals of the run that is here, with their dates; none where there is no run."""
-        with suppress(OSError, ValueError):
-            return decoded((self.directory / INDEX).read_bytes(), Index).campaign.goals
+        with suppress(InputError):
+            return self.index().campaign.goals
         return []
 
     def index(self) -> Index:
@@ -206,187 +278,177 @@ class Store:
         Raises
         ------
         problems.errors.InputError
-            If the directory holds no run.
+            If the place holds no run.
         """
-        try:
-            content = (self.directory / INDEX).read_bytes()
-        except (FileNotFoundError, NotADirectoryError):
-            there = "has no results" if self.directory.is_dir() else "does not exist"
-            raise InputError(
-                f"the directory {str(self.directory)!r} {there}; make some with: hbvm-bench run."
-            ) from None
-        except OSError as error:
-            raise InputError(f"cannot read {str(self.directory)!r}: {error.strerror}.") from None
+        self._require()
+        rows = self._rows("SELECT asked FROM runs WHERE run=?")
+        if not rows:
+            raise self._no_run()
         self.add_known()
         try:
-            index = decoded(content, Index)
+            index = decoded(rows[0][0].encode(), Index)
             cases = index.cases or index.campaign.cases()
+            if len(index.ids) != len(cases) or len(set(index.ids)) != len(cases):
+                raise ValueError(f"{len(set(index.ids))} ids of {len(cases)} cases")
         except ValueError as error:  # msgspec's errors and ours are among them
             words = str(error).rstrip(".")
-            raise InputError(f"{self.directory / INDEX} is not the index of a run: {words}.") from None
-        if len(index.ids) != len(cases) or len(set(index.ids)) != len(cases):
-            raise InputError(
-                f"{self.directory / INDEX} is damaged: {len(set(index.ids))} ids of {len(cases)} cases; "
-                f"what has run is kept, {again(index, self.directory)}."
-            )
+            raise InputError(f"{str(self.path)!r} has no index of a run: {words}.") from None
         return index
 
     def records(self) -> list[Record]:
         """Return the records of the run that are there, in the order of the campaign.
 
         Labels and notes are the campaign's present ones: they are words, and no reason to run again.
-        A record that cannot be read is one that says so.
+
+        Raises
+        ------
+        problems.errors.InputError
+            If there is no run, or one of its rows is damaged.
         """
+        listed = self.index().listed()
+        rows = dict(self._rows("SELECT id, record FROM results WHERE run=?"))
         records: list[Record] = []
-        index = self.index()
-        for case_id, case in index.listed():
+        for case_id, case in listed:
+            if case_id not in rows:
+                continue
             try:
-                record = self._read(case_id)
-                if not is_of(record.case, case):
-                    raise ValueError("it is the record of another case")
-            except FileNotFoundError:
-                continue
-            except (OSError, ValueError) as error:
-                records.append(_unread(case_id, case, error, again(index, self.directory)))
-                continue
+                record = decoded(rows[case_id].encode(), Record)
+            except ValueError as error:
+                words = f"the row of {case.method} on {case.problem} in {str(self.path)!r} is damaged"
+                raise InputError(f"{words}: {error}; {self.again()}.") from None
             words = msgspec.structs.replace(record.case, settings=case.settings, note=case.note)
             records.append(msgspec.structs.replace(record, case=words))
         return records
 
-    def beside(self) -> dict[str, Any]:
-        """Return what a study keeps beside its cases, by name: the other JSON files of the directory."""
-        contents = {}
-        for path in sorted(self.directory.glob("*.json")):
-            if path.name != INDEX:
-                with suppress(OSError, ValueError):
-                    contents[path.stem] = decoded(path.read_bytes(), object)
-        return contents
-
     def everything(self) -> Iterator[Record]:
-        """Yield all records in the directory, those of earlier versions and other settings too."""
-        for path in sorted(self.cases.glob("[!.]*.json")):
-            with suppress(OSError, ValueError):
-                yield self._read(path.stem)
+        """Yield all records of the run, those of earlier sources and other settings too."""
+        for (text,) in self._rows("SELECT record FROM results WHERE run=? ORDER BY rowid"):
+            with suppress(ValueError):
+                yield decoded(text.encode(), Record)
 
-    def _read(self, case_id: str) -> Record:
-        """Return the record of a case, by its id or as much of it as is in the file's name."""
-        content = self._record_path(case_id).read_bytes()
-        schema = decoded(content, _Version).schema
-        if schema != SCHEMA:
-            when = "an earlier" if schema < SCHEMA else "a later"
-            raise OtherVersionError(f"measured by {when} version of hbvm-bench")
-        record = decoded(content, Record)
-        if case_id not in (record.id, record.id[:NAME_LENGTH]):
-            raise ValueError("it is the record of another case")
-        return record
+    def again(self) -> str:
+        """Say how to repair a run; its own command may be a stranger's, and is not for pasting."""
+        return f"run its campaign again with --out {shlex.quote(str(self.directory))}"
 
-    def _record_path(self, case_id: str) -> Path:
-        return self.cases / f"{case_id[:NAME_LENGTH]}.json"
+    def runs(self) -> list["Store"]:
+        """Return the store of each run in the file, in the order in which they were measured."""
+        self._require()
+        numbers = [number for (number,) in self._all("SELECT run FROM runs ORDER BY run")]
+        if not numbers:
+            raise self._no_run()
+        stores = [Store(self.directory, number) for number in numbers]
+        for store in stores:
+            store._open, store._owner = self._database, self
+        return stores
 
-    def _reading_path(self, case_id: str) -> Path:
-        return self.directory / READINGS / f"{case_id[:NAME_LENGTH]}.json"
+    def packed(self) -> bytes:
+        """Return the file as bytes, compressed; what was stored in the same order gives the same bytes."""
+        self._database.execute(f"PRAGMA user_version={VERSION}")
+        content = self._database.serialize()
+        return lzma.compress(content, preset=9 | lzma.PRESET_EXTREME)
 
-    def _series_path(self, case_id: str) -> Path:
-        return self.cases / f"{case_id[:NAME_LENGTH]}.npz"
+    @property
+    def _database(self) -> sqlite3.Connection:
+        if self._open is None:
+            self._keep_open(_connected(self.path))
+        assert self._open is not None
+        return self._open
 
+    def _keep_open(self, database: sqlite3.Connection) -> None:
+        self._open = database
+        weakref.finalize(self, database.close)
 
-def is_of(stored: Case, asked: Case) -> bool:
-    """Whether the case of a record is the one asked for; labels and notes are words and do not count."""
-    words = msgspec.structs.replace(
-        asked, problem=stored.problem, method=stored.method, settings=stored.settings, note=stored.note
-    )
-    texts = (asked.problem, stored.problem, _problem), (asked.method, stored.method, _method)
-    return words == stored and all(
-        ours == theirs or _prints_as(ours, theirs, tolerance) for ours, theirs, tolerance in texts
-    )
+    def _rows(self, query: str, *given: str) -> list[tuple[Any, ...]]:
+        return self._all(query, self.run, *given)
 
+    def _all(self, query: str, *given: object) -> list[tuple[Any, ...]]:
+        with self._told():
+            return self._database.execute(query, given).fetchall()
 
-def _prints_as(asked: str, stored: str, printed: Callable[[str], str]) -> bool:
-    with suppress(InputError):
+    @contextmanager
+    def _writing(self) -> Iterator[sqlite3.Connection]:
+        with self._told(), self._database as database:
+            yield database
+
+    @contextmanager
+    def _told(self) -> Iterator[None]:
         try:
-            return printed(asked) == stored
-        except InputError:  # of a plugin that is not here
-            return parse_spec(asked).name == parse_spec(stored).name
-    return False
+            yield
+        except sqlite3.OperationalError as error:
+            full = "No space left on device" if "full" in str(error) else str(error)
+            raise InputError(f"cannot read or write {str(self.path)!r}: {full}.") from error
+        except sqlite3.DatabaseError as error:
+            raise InputError(f"{str(self.path)!r} is no store of results: {error}.") from error
+
+    def _no_run(self) -> InputError:
+        return InputError(f"{str(self.path)!r} has no run yet; make one with: hbvm-bench run.")
+
+    def _require(self) -> None:
+        """Refuse a place without a store, in one sentence."""
+        if self._open is not None or self.path.is_file():
+            return
+        if any((self.directory / name).is_file() for name in FORMER):
+            raise InputError(
+                f"{str(self.directory)!r} has results of hbvm-bench 0.1; read them with that version "
+                "(pip install 'hbvm-bench==0.1.*'), or run the campaign again."
+            )
+        there = "has no results" if self.directory.is_dir() else "does not exist"
+        raise InputError(f"the directory {str(self.directory)!r} {there}; make some with: hbvm-bench run.")
 
 
-def _problem(text: str) -> str:
-    return repr(make_problem(text))
+def _connected(path: Path) -> sqlite3.Connection:
+    """Open a file that may be a stranger's, and that of another version.
 
-
-def _method(text: str) -> str:
-    return str(Spec(parse_spec(text).name, make_method(text).options()))
-
-
-def _unread(case_id: str, case: Case, error: Exception, again: str) -> Record:
-    """Return the row of a case whose record cannot be used."""
-    outcome: Outcome = "damaged"
-    reason = f"its record in the store is damaged ({' '.join(str(error).split())}); {again}"
-    if isinstance(error, OtherVersionError):
-        outcome, reason = "outdated", f"{error}; {again}"
-    with suppress(InputError):
-        case = msgspec.structs.replace(case, problem=_problem(case.problem))
-    known: dict[str, Any] = {"role": "peer", "library": "", "order": None}  # of a plugin that is not here
-    with suppress(InputError):
-        case = msgspec.structs.replace(case, method=_method(case.method))
-        known = of_method(make_method(case.method))
-    return Record(id=case_id, case=case, result=Result(outcome=outcome, reason=reason), **known)
-
-
-def again(index: Index, directory: Path) -> str:
-    """Say how to repair a run; its own command may be a stranger's, and is not for pasting."""
-    return f"run the campaign {index.campaign.name!r} again with --out {shlex.quote(str(directory))}"
-
-
-def damage(record: Record, series: Mapping[str, NDArray[np.float64]], dim: int) -> str:
-    """Return what is wrong with the series of a case, ``""`` where they are as a run writes them.
-
-    A record without a trajectory has none; ``dim`` is the length of a state.
+    Raises
+    ------
+    problems.errors.InputError
+        If it is something else, or damaged.
     """
-    if record.result.outcome in ("damaged", "outdated"):
-        return "there is no record of them"
-    if record.result.outcome not in ("ok", "stalled"):
-        return ""
-    if absent := [name for name in SERIES if name not in series]:
-        return f"there is no {absent[0]}"
-    t, y = series["t"], series["y"]
-    lengths = {name: t.size for name in series if name.startswith(("distance", "error.", "guard."))}
-    if "position_t" in series:  # of an earlier version, as is the distance
-        lengths |= dict.fromkeys(("position", "phase"), series["position_t"].size)
-    if t.ndim != 1 or y.shape != (t.size, dim):
-        return f"t has the shape {t.shape} and y {y.shape}"
-    if "starts.y0" in series and series["starts.y0"].shape[1:] != (dim,):
-        return f"its further initial conditions have the shape {series['starts.y0'].shape}"
-    states = (len(series.get("starts.y0", ())), t.size, dim)
-    if "starts.y0" in series and getattr(series.get("starts.y"), "shape", ()) != states:
-        return "the states of its further trajectories do not belong to its times"
-    if "reversal.y" in series and series["reversal.y"].shape != (1, dim):
-        return f"its way back ends in the shape {series['reversal.y'].shape}"
-    sizes = {"chaos.megno": (1,), "chaos.exponent": (3,)}
-    if wrong := [name for name, size in sizes.items() if name in series and series[name].shape != size]:
-        return f"{wrong[0]} has the shape {series[wrong[0]].shape}"
-    subset = series.get("witness.index", np.empty(0))
-    if not np.all((subset >= 0) & (subset < t.size)) or any(
-        getattr(series.get(f"witness.{part}"), "shape", ()) != (subset.size, dim)
-        for part in ("high", "low")
-        if subset.size
-    ):
-        return "its reference subset is not among its trajectories"
-    if wrong := [name for name, length in lengths.items() if series[name].shape != (length,)]:
-        return f"{wrong[0]} has the shape {series[wrong[0]].shape}, beside {lengths[wrong[0]]} times"
-    if drifts := [name for name in series if name.startswith("drift.")]:
-        times = series.get("drift.t", np.empty(0))
-        if times.ndim != 1 or any(series[name].shape[-1:] != times.shape for name in drifts):
-            return "the errors of its drift do not belong to the times of it"
-    if series.get("extra.dt_history", np.empty((0, 2))).shape[1:] != (2,):
-        return "its step sizes have no times"
-    steps = np.diff(t)
-    if record.case.ensemble is None:
-        if not np.isfinite(t).all() or not (np.all(steps > 0) or np.all(steps < 0)):
-            return "its times do not go one way"
-        if not np.isfinite(y[:1]).all() or (record.result.status == "finished" and not np.isfinite(y).all()):
-            return "its states are not finite"
-    return ""
+    try:
+        if path.suffix == ".xz":
+            database = sqlite3.connect(":memory:")
+            database.deserialize(_decompressed(path))
+        else:
+            database = sqlite3.connect(f"{path.resolve().as_uri()}?mode=rw", uri=True)
+        database.execute("PRAGMA trusted_schema=OFF")
+        (version,) = database.execute("PRAGMA user_version").fetchone()
+        tables = {name for (name,) in database.execute("SELECT name FROM sqlite_master WHERE type='table'")}
+    except (OSError, sqlite3.Error, lzma.LZMAError, ValueError) as error:
+        raise InputError(f"{str(path)!r} is no store of results: {error}.") from None
+    if "results" in tables and version == VERSION:
+        return database
+    database.close()
+    if "results" in tables:
+        raise InputError(f"{str(path)!r} was written by another version; run its campaign again.")
+    raise InputError(f"{str(path)!r} is no store of results: it has no table of them.")
+
+
+def _decompressed(path: Path) -> bytes:
+    most = int(limits.limit("GIB") * 2**30)
+    unpacking = lzma.LZMADecompressor(memlimit=2**28)
+    content = unpacking.decompress(path.read_bytes(), most)
+    if not unpacking.eof:
+        raise ValueError(f"it is cut, or has more than {most} bytes")
+    return content
+
+
+def _journal(directory: Path) -> str:
+    """Return how SQLite keeps transactions in a directory: by a log, beside which others read, or not."""
+    place = directory.resolve()
+    mounts = {Path(part.mountpoint): part.fstype.lower() for part in psutil.disk_partitions(all=True)}
+    kind = next((mounts[folder] for folder in (place, *place.parents) if folder in mounts), "")
+    return "DELETE" if kind.startswith(SHARED) else "WAL"
+
+
+def opened(places: Sequence[Path]) -> list[Store]:
+    """Return the runs at some places.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If one of them holds none.
+    """
+    return [store for place in places for store in Store(place).runs()]
 
 
 def progress(record: Record) -> tuple[bool, int, str]:
@@ -396,50 +458,3 @@ def progress(record: Record) -> tuple[bool, int, str]:
     """
     rounds = len(record.timing.rounds) if record.timing else 0
     return record.result.outcome == "ok", rounds, record.finished
-
-
-def encode_series(series: Mapping[str, NDArray[np.float64]]) -> bytes:
-    """Return arrays by name as a compressed ``.npz`` file without pickles."""
-    stream = io.BytesIO()
-    np.savez_compressed(stream, allow_pickle=False, **series)  # pyright: ignore[reportArgumentType]
-    return stream.getvalue()
-
-
-def decode_series(content: bytes) -> dict[str, NDArray[np.float64]]:
-    """Return the arrays of a ``.npz`` file by name; empty if it is not one of ours.
-
-    It may be cut or something else; be far larger than it looks; have pickles, texts or complex
-    numbers; or have names that are none, for names go into pages and file names.
-
-    Raises
-    ------
-    problems.errors.InputError
-        If the environment's limit of memory is no number.
-    """
-    most = limits.limit("GIB") * 2**30
-    try:
-        with zipfile.ZipFile(io.BytesIO(content)) as archive:
-            if sum(member.file_size for member in archive.infolist()) > most:
-                return {}
-            arrays = {name.removesuffix(".npy"): _array(archive.read(name)) for name in archive.namelist()}
-    except Exception:  # zipfile and numpy raise a dozen kinds, and the content is a stranger's
-        return {}
-    ours = all(NAME.fullmatch(name) and array.dtype.kind in "fiu" for name, array in arrays.items())
-    return arrays if ours else {}
-
-
-@lru_cache(maxsize=128)  # a run's series are alike
-def _header(content: bytes) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
-    stream = io.BytesIO(content)
-    np.lib.format.read_magic(stream)
-    return np.lib.format.read_array_header_1_0(stream)
-
-
-def _array(content: bytes) -> NDArray[np.float64]:
-    """Read a ``.npy`` file whose header promises no more than follows it."""
-    start = 10 + int.from_bytes(content[8:10], "little")
-    shape, fortran, dtype = _header(content[:start])
-    if math.prod(shape) * dtype.itemsize != len(content) - start:
-        raise ValueError("its header says another size")
-    array = np.frombuffer(content, dtype, offset=start)  # refuses what would need pickles
-    return np.atleast_1d(array.reshape(shape, order="F" if fortran else "C").copy())

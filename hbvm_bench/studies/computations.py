@@ -24,7 +24,6 @@ import numpy as np
 from hbvm_bench.campaign.identity import digest_of
 from hbvm_bench.report.document import Block, Claim, Claims, Maker, Section, attempt
 from hbvm_bench.run import executors
-from hbvm_bench.store.files import write_json
 from hbvm_bench.store.records import Record
 from hbvm_bench.store.store import Store
 from problems.errors import InputError
@@ -173,7 +172,7 @@ def run_all(
     code = digest_of(tuple({function_of(task.run).__module__ for task in tasks})) + variant
     stored = StoredResults({}, {}, code)
     with suppress(InputError):
-        before = load(name, store.beside())
+        before = load(name, store.studies())
         stored = StoredResults(before.results, {}, code) if before.code == code else stored
     left = sorted((task for task in tasks if task.key not in stored.results), key=lambda task: -task.cost)
     for key, data, why, seconds in _outcomes(left, jobs):
@@ -181,7 +180,7 @@ def run_all(
             stored.failed[key] = why
         else:
             stored.results[key] = data
-        write_json(store.directory / f"{name}.json", stored)
+        store.keep_study(name, stored)
         done(key, why or f"{seconds:.1f} s")
     return stored
 
@@ -208,7 +207,7 @@ def _side_by_side(tasks: Sequence[Task], jobs: int) -> Iterator[tuple[str, bytes
 
 
 def load(name: str, beside: Mapping[str, object]) -> StoredResults:
-    """Return what a store or an archive keeps of a study beside its cases.
+    """Return what a store keeps of a study beside its cases.
 
     Raises
     ------

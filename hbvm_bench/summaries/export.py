@@ -5,19 +5,17 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
-from typing import Any, cast
+from typing import Any
 
 import msgspec
 import numpy as np
 
-from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.measure import reading
 from hbvm_bench.measure.metrics import METRICS
-from hbvm_bench.store.archive import Archive
 from hbvm_bench.store.files import atomic, csv_of
 from hbvm_bench.store.records import Record, Timing, Value
-from hbvm_bench.store.store import Store, damage
+from hbvm_bench.store.store import Store
 from problems.errors import InputError, MissingLibraryError, unknown
 
 ExportRow = tuple[Any, ...]
@@ -32,29 +30,29 @@ class ExportTable:
     rows: Callable[[Record, Store], Iterable[ExportRow]]
 
 
-def export(stores: Sequence[Store] | Sequence[Archive], path: Path, table: str = "cases") -> int:
+def export(stores: Sequence[Store], path: Path, table: str = "cases") -> int:
     """Write one of `TABLES` to a file that ends in ``.csv`` or ``.parquet``; return the number of rows.
 
     Raises
     ------
     problems.errors.InputError
-        For another ending or table, a directory without a run, the series of an archive, or a missing
+        For another ending or table, a directory without a run, the series of a report, or a missing
         library.
     """
     if table not in TABLES:
         raise unknown("table", table, TABLES)
     if path.suffix not in FORMATS:
         raise InputError(f"{str(path)!r} must end in {' or '.join(FORMATS)}.")
-    if table == "series" and any(isinstance(store, Archive) for store in stores):
-        raise InputError(f"{str(stores[0].directory)!r} is an archive, which has no series; export a run.")
     chosen, stored, count = TABLES[table], [(store, reading.records(store)) for store in stores], 0
     writer = _csv if path.suffix == ".csv" else _parquet
     with atomic(path) as temporary, writer(temporary, chosen.columns) as write:
         for store, records in stored:
             for record in records:
-                rows = list(chosen.rows(record, cast(Store, store)))
+                rows = list(chosen.rows(record, store))
                 write(rows)
                 count += len(rows)
+        if table == "series" and not count:
+            raise InputError(f"{str(stores[0].directory)!r} is a report, which has no series; export a run.")
     return count
 
 
@@ -123,13 +121,9 @@ def _timings(record: Record, store: Store) -> Iterator[ExportRow]:
 
 
 def _series(record: Record, store: Store) -> Iterator[ExportRow]:
-    series = store.series(record.id)
-    if why := damage(record, series, make_problem(record.case.problem).system.dim):
-        yield (*_key(record), f"damaged: {why}", None, None, None, None)
-        return
-    series = reading.drawn(record, series)
+    series = reading.drawn(record, store.series(record.id))
     for name, values in series.items():
-        times = series["position_t" if name.startswith(("position", "phase")) else "t"]
+        times = series.get("position_t" if name.startswith(("position", "phase")) else "t", np.empty(0))
         for i, parts in enumerate(values):
             t = float(times[i]) if len(times) == len(values) else None
             for component, value in enumerate(np.ravel(parts).tolist()):

@@ -12,7 +12,7 @@ from hbvm_bench.run import checked, loop
 from problems.errors import InputError
 
 WORDS = {"title", "description", "note", "words", "alone", "name", "lead", "series"}
-"""Texts for readers, the name of a thing itself, and series: an archive keeps those that are there."""
+"""Texts for readers, the name of a thing itself, and series: a report keeps those that are there."""
 
 FREE = {"values", "sweep"}
 """Tables whose keys are the file's own names."""

@@ -10,6 +10,7 @@ from hbvm_bench.measure import reading
 from hbvm_bench.run.task import execute, task_of
 from hbvm_bench.store.records import Record, decoded
 from hbvm_bench.store.store import Store
+from problems.errors import InputError
 
 HERE = Path(__file__).parent
 TOYS = (
@@ -64,3 +65,13 @@ def run_case(case, directory, limits):
     store = Store(Path(directory))
     store.save(made, series or None)
     return reading.up_to_date(store, made)
+
+
+def stored(store):
+    """Return when each case that a store has was measured, and its bits; nothing before it has any."""
+    if not store.path.is_file():
+        return {}
+    try:
+        return {one.id: (one.finished, store.packed_series(one.id)) for one in store.everything()}
+    except InputError:
+        return {}

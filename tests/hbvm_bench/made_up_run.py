@@ -14,9 +14,8 @@ from hbvm_bench.campaign.identity import Resolved, resolve
 from hbvm_bench.measure import machine, raw, reading
 from hbvm_bench.reference import solutions
 from hbvm_bench.report.page import Results
-from hbvm_bench.store import archive
 from hbvm_bench.store.records import Compile, Counters, Record, Result, Timing, TimingRound, Value
-from hbvm_bench.store.store import Index, Store
+from hbvm_bench.store.store import PACKED, Index, Store
 from integrators.protocol import Stats, Status
 from integrators.solution import Solution
 
@@ -253,10 +252,18 @@ def results_of(*runs, beside=None):
 
 
 def archived(directory, *runs):
-    """Put runs that nobody ran into an archive."""
-    tables = [archive.table(run.index, run.records, {}) for run in runs]
+    """Put runs that nobody ran into the store of a report."""
+    store = Store()
+    for store.run, run in enumerate(runs, 1):
+        index = run.index
+        if len(index.ids) != len(index.cases or index.campaign.cases()):
+            ids, cases = [one.id for one in run.records], [one.case for one in run.records]
+            index = msgspec.structs.replace(index, ids=ids, cases=cases)
+        store.write_index(index)
+        for one in run.records:
+            store.save(one)
     directory.mkdir(parents=True, exist_ok=True)
-    (directory / archive.NAME).write_bytes(archive.packed(archive.Contents(runs=tables)))
+    (directory / PACKED).write_bytes(store.packed())
 
 
 if __name__ == "__main__":  # python -m tests.hbvm_bench.made_up_run DIRECTORY CASES

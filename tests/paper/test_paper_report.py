@@ -13,9 +13,7 @@ from msgspec.structs import replace
 from hbvm_bench.campaign.file import load
 from hbvm_bench.cli import main
 from hbvm_bench.report.figures.canvas import new, small
-from hbvm_bench.store.archive import NAME
-from hbvm_bench.store.files import write_json
-from hbvm_bench.store.store import Store
+from hbvm_bench.store.store import PACKED, Store
 from hbvm_bench.studies import computations as results
 from hbvm_bench.studies.drawn import number
 from hbvm_bench.studies.paper import properties_part, report
@@ -80,12 +78,14 @@ def work(count: int) -> list[results.Task]:
 def ran(tasks, directory, jobs=1):
     """Run tasks and return what is kept, and what was said of those that ended, in order."""
     said: dict[str, str] = {}
-    kept = results.run_all("paper", tasks, jobs, Store(directory), said.__setitem__)
+    store = Store(directory)
+    store.prepare()
+    kept = results.run_all("paper", tasks, jobs, store, said.__setitem__)
     return kept, said
 
 
 def stored(directory):
-    return results.load("paper", Store(directory).beside())
+    return results.load("paper", Store(directory).studies())
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
@@ -122,7 +122,7 @@ def test_a_run_goes_on_where_it_was_but_not_by_other_code(tmp_path):
     assert list(ran(work(3), tmp_path)[1]) == ["squares/2"]
     assert list(ran(work(3), tmp_path)[1]) == []
     kept = stored(tmp_path)
-    write_json(tmp_path / "paper.json", results.StoredResults(kept.results, {}, code="another"))
+    Store(tmp_path).keep_study("paper", results.StoredResults(kept.results, {}, code="another"))
     assert len(ran(work(3), tmp_path)[1]) == 3
 
 
@@ -215,14 +215,14 @@ def test_a_report_is_written_whole_drawn_again_and_loses_little_where_a_result_i
     assert not re.search(r'(?:src|href)="(?:https?:)?//', html)
     assert "**8** confirmed · **0** confirmed in part · **0** not found" in markdown
 
-    for place in (tmp_path, folder):  # from the store, and from the archive alone
+    for place in (tmp_path, folder):  # from the store, and from the report alone
         assert main(["report", str(place), "--out", str(tmp_path / "again")]) == 0
-        for name in ("index.html", "report.md", NAME):
+        for name in ("index.html", "report.md", PACKED):
             assert (tmp_path / "again" / name).read_bytes() == files[name], (place, name)
 
     kept = stored(tmp_path)
     del kept.results["claims/orders"]
-    write_json(tmp_path / "paper.json", kept)
+    Store(tmp_path).keep_study("paper", kept)
     assert main(["report", str(tmp_path), "--out", str(tmp_path / "again")]) == 1
     assert (
         "not made: the order: InputError: the computation 'claims/orders' was not run."

@@ -4,6 +4,7 @@ import json
 import os
 import shlex
 import signal
+import sqlite3
 import subprocess
 import sys
 import time
@@ -14,7 +15,8 @@ import pytest
 from hbvm_bench import cli
 from hbvm_bench.commands import run
 from hbvm_bench.measure.metrics import METRICS
-from tests.hbvm_bench.conftest import SHORT
+from hbvm_bench.store.store import Store
+from tests.hbvm_bench.conftest import SHORT, stored
 
 COMMAND = [sys.executable, "-m", "hbvm_bench.cli"]
 
@@ -36,8 +38,8 @@ def fails(capsys, *arguments, says):
 
 
 def test_a_directory_of_files_that_are_no_run_is_refused(here, capsys):
-    (here / "campaign.json").write_text("{}")
-    fails(capsys, "show", ".", says="not the index of a run")
+    (here / "results.sqlite").write_text("{}")
+    fails(capsys, "show", ".", says="no store of results")
 
 
 def test_help_version_and_lists(capsys):
@@ -68,12 +70,12 @@ def test_a_run_is_stored_shown_and_not_repeated(toys, here, capsys):
         "report.md",
         "index.html",
         "figures",
-        "results.json.xz",
+        "results.sqlite.xz",
     }
-    records = {path: path.stat().st_mtime_ns for path in (here / "r" / "cases").iterdir()}
+    records = stored(Store(here / "r"))
     assert cli.main(arguments) == 0
     assert "2 already there" in capsys.readouterr().err
-    assert {path: path.stat().st_mtime_ns for path in (here / "r" / "cases").iterdir()} == records
+    assert stored(Store(here / "r")) == records
 
     assert cli.main(["show", "r", "--json"]) == 0
     shown = json.loads(capsys.readouterr().out, parse_constant=lambda name: pytest.fail(name))
@@ -94,10 +96,11 @@ def test_a_run_is_stored_shown_and_not_repeated(toys, here, capsys):
 
 def test_a_report_of_a_run_without_a_finished_case_says_so(toys, here, capsys):
     assert cli.main(["run", "-p", SHORT, "-m", "Refusing()", "--out", "r"]) == 0
-    for path in (here / "r" / "cases").iterdir():
-        path.unlink()
+    with sqlite3.connect(here / "r" / "results.sqlite") as database:
+        database.execute("DELETE FROM results")
+    database.close()
     capsys.readouterr()
-    fails(capsys, "report", "r", "-o", "rep", says=("has finished", "run the campaign 'custom' again"))
+    fails(capsys, "report", "r", "-o", "rep", says=("has finished", "run its campaign again"))
     fails(capsys, "show", "r", says="no finished case")
 
 
@@ -105,7 +108,7 @@ def test_a_campaign_file_runs(toys, here, capsys):
     head = f'name = "x"\nproblems = ["{SHORT}"]\ngrid = {{count = 2}}\n'
     (here / "x.toml").write_text(head + '[[methods]]\nuse = "Steady()"\nnote = "<i>"\n')
     assert cli.main(["run", "x.toml", "--no-timing"]) == 0
-    assert (here / "runs" / "x" / "campaign.json").is_file()
+    assert (here / "runs" / "x" / "results.sqlite").is_file()
     out = capsys.readouterr().out
     assert "not timed" not in out
     assert "<i>" in out
@@ -128,7 +131,8 @@ def test_the_command_that_is_kept_has_no_folder_of_this_machine(
     other, commands = tmp_path_factory.mktemp("other"), []
     monkeypatch.setattr(run, "carry_out", lambda campaign, out, command, **_: commands.append(command))
     monkeypatch.setattr(run, "opened", lambda campaign, name: campaign)
-    monkeypatch.setattr(run, "show", lambda campaign, store: None)
+    for name in ("show", "refuse_died"):
+        monkeypatch.setattr(run, name, lambda *_: None)
     (here / "in").mkdir()
     for folder in (here, here / "in", other):
         (folder / "x.toml").write_text('name = "x"\nproblems = ["kepler()"]\nmethods = [{use = "HBVM()"}]\n')
@@ -152,9 +156,9 @@ def test_ctrl_c_keeps_what_is_finished_and_a_rerun_goes_on(toys, here):
     running = subprocess.Popen(
         [*COMMAND, *arguments], stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     )
-    cases = here / "runs" / "custom" / "cases"
-    deadline = time.monotonic() + 30
-    while not list(cases.glob("*.json")) and time.monotonic() < deadline:
+    store = Store(here / "runs" / "custom")
+    deadline = time.monotonic() + 60
+    while not stored(store) and time.monotonic() < deadline:
         time.sleep(0.05)
     time.sleep(0.5)
     children = Path(f"/proc/{running.pid}/task")
@@ -166,14 +170,14 @@ def test_ctrl_c_keeps_what_is_finished_and_a_rerun_goes_on(toys, here):
     assert "Traceback" not in err
     assert workers
     assert not any(Path(f"/proc/{pid}").exists() for pid in workers)
-    kept = {path.name: path.stat().st_mtime_ns for path in cases.iterdir()}
+    kept = stored(store)
 
     again = [argument.replace("wait=20.0", "wait=20.0, h=0.2") for argument in arguments]
     again = [argument.replace("wait=20.0", "wait=0.1") for argument in again]
     done = subprocess.run([*COMMAND, *again], capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 0
     assert "1 already there" in done.stderr
-    assert kept.items() <= {path.name: path.stat().st_mtime_ns for path in cases.iterdir()}.items()
+    assert kept.items() <= stored(store).items()
 
 
 def test_output_into_a_closed_pipe_is_no_error():

@@ -1,22 +1,23 @@
 """Studies with a command of their own give the page of ``run NAME --report``, byte for byte."""
 
-import lzma
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from hbvm_bench.campaign.file import load
 from hbvm_bench.campaign.shorter import chosen, quick_run
 from hbvm_bench.cli import main
-from hbvm_bench.store import archive
-from hbvm_bench.store.store import Store
+from hbvm_bench.store.store import PACKED, Store
 from tests.hbvm_bench import made_up_run
 
 
 def pages(directory, command):
-    """Return every file of a report, the archive unpacked, with a word for the command that it names."""
+    """Return every file of a report, its rows read, with a word for the command that it names."""
     files = {path.name: path.read_bytes() for path in directory.rglob("*") if path.is_file()}
-    files[archive.NAME] = lzma.decompress(files[archive.NAME])
+    (stored,) = Store(directory / PACKED).runs()
+    rows = [*stored.records(), stored.studies(), stored.figures(), stored.index()]
+    files[PACKED] = msgspec.json.encode(rows)
     assert any(command.encode() in content for content in files.values())
     return {name: content.replace(command.encode(), b"COMMAND") for name, content in files.items()}
 

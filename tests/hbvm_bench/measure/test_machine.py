@@ -18,9 +18,8 @@ from hbvm_bench.measure import machine, processor
 from hbvm_bench.report.markdown import markdown
 from hbvm_bench.report.page import page_of
 from hbvm_bench.run import timing_pass
-from hbvm_bench.store import archive
 from hbvm_bench.store.records import Timing
-from hbvm_bench.store.store import Store
+from hbvm_bench.store.store import PACKED, Store, opened
 from hbvm_bench.store.stored_run import StoredRun
 from hbvm_bench.studies.race import results, tables
 from problems.errors import InputError
@@ -157,7 +156,7 @@ def test_results_of_several_kinds_lie_side_by_side(tmp_path):
     keep(of(ZEN5, 3.0), tmp_path)
     keep(of(ZEN4, 1.25, "henon_heiles"), tmp_path)
     page = text_in(tmp_path)
-    assert {path.name for path in tmp_path.iterdir()} == {archive.NAME, "README.md", "index.html", "figures"}
+    assert {path.name for path in tmp_path.iterdir()} == {PACKED, "README.md", "index.html", "figures"}
     assert "| problem | against | goal | znver4-256bit | znver5 |" in page
     assert (
         "| `kepler(e=0.6, t_end=3150.0)` | `Taylor(tol=1e-15)` | ≥ 2 | 2.00× reached | 3.00× reached" in page
@@ -182,13 +181,13 @@ def test_a_number_stays_with_the_run_that_it_came_from(tmp_path):
     )
     keep(first, tmp_path)
     keep(later, tmp_path)
-    assert [one.records() for one in archive.read(tmp_path / archive.NAME)] == [first.records, later.records]
+    assert [one.records() for one in opened([tmp_path])] == [first.records, later.records]
     page = text_in(tmp_path)
     assert "Measured on 2026-01-02 with numpy 2: `hbvm-bench automatic`" in page
     assert "Measured on 2027-01-02 with numpy 3: `hbvm-bench automatic henon_heiles`" in page
     again = of(ZEN4)
     keep(again, tmp_path)
-    assert [one.records() for one in archive.read(tmp_path / archive.NAME)] == [later.records, again.records]
+    assert [one.records() for one in opened([tmp_path])] == [later.records, again.records]
 
 
 def test_arithmetic_of_another_width_is_another_kind(tmp_path):

@@ -37,8 +37,7 @@ from hbvm_bench.report.figures.style import looks
 from hbvm_bench.report.html import Place
 from hbvm_bench.report.page import document
 from hbvm_bench.report.write import rendered, write
-from hbvm_bench.store.archive import opened
-from hbvm_bench.store.store import Store
+from hbvm_bench.store.store import Store, opened
 from hbvm_bench.summaries.table import Table
 from tests.hbvm_bench import made_up_run
 

@@ -18,9 +18,8 @@ from hbvm_bench.report.markdown import code, plain
 from hbvm_bench.report.page import document
 from hbvm_bench.report.problem import part
 from hbvm_bench.report.write import write
-from hbvm_bench.store import archive
 from hbvm_bench.store.records import Timing, Value
-from hbvm_bench.store.store import Index, Store
+from hbvm_bench.store.store import PACKED, Index, Store
 from problems.errors import InputError
 from tests.hbvm_bench import made_up_run
 from tests.hbvm_bench.made_up_run import HOSTILE, METHODS
@@ -51,7 +50,7 @@ class Reader(HTMLParser):
         self.ids += [given["id"]] if "id" in given else []
         for name in ("src", "href", "xlink:href", "data", "srcset", "action"):
             target = given.get(name) or ""
-            relative = target.startswith("#") or target == archive.NAME
+            relative = target.startswith("#") or target == PACKED
             if name in given and not (relative and (tag in ("a", "use") or target.startswith("#"))):
                 self.requests.append((tag, target))
         assert not [name for name in given if name.startswith("on")]

@@ -132,8 +132,8 @@ def test_the_list_of_reports_says_when_and_where_each_was_measured(tmp_path):
         "HBVM()", problem="pendulum()", timing=timed(others=0.02, steal=0.0), kernel="0123456789abcdef"
     )
     peer = made_up_run.record("IAS15()", problem="pendulum()", timing=timed(others=0.3, steal=0.01))
-    campaign = Campaign(name="one", problems=["pendulum()"], methods=[MethodEntry(use="HBVM()")])
-    index = Index(campaign=campaign, ids=[ours.id], version="0", command="")
+    campaign = Campaign(name="one", problems=["pendulum()"], methods=[MethodEntry(use=["HBVM()", "IAS15()"])])
+    index = Index(campaign=campaign, ids=[ours.id, peer.id], version="0", command="")
     made_up_run.archived(tmp_path / "one", StoredRun(index=index, records=[ours, peer]))
     (tmp_path / "one" / "report.md").write_text("# A title\n", encoding="utf-8")
     row = "| one | 2026-01-02 | A, znver5-512bit | 0123456789ab | 2% to 30% | 0% to 1% |"
@@ -156,7 +156,7 @@ def test_the_list_of_reports_names_the_campaigns_that_have_none_and_a_race_witho
         (tmp_path / name / "report.md").write_text("# A title\n", encoding="utf-8")
     avx2 = "race --avx2: The race: time at equal accuracy, with AVX2 only"
     missing = ["drift: Conservation in long integrations", "large: Large systems"]
-    assert not_measured(tmp_path) == [*missing, avx2]  # no archive
+    assert not_measured(tmp_path) == [*missing, avx2]  # no stored rows
     measured({})
     assert not_measured(tmp_path) == [*missing, avx2]
     assert "## Not measured\n\n- drift: Conserv" in write_index(tmp_path).read_text(encoding="utf-8")

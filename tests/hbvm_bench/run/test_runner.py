@@ -301,7 +301,7 @@ def test_a_stopped_run_stores_nothing_and_leaves_no_process(toys, store):
         supervise.allow()
         pool.shutdown()
     assert not Path(f"/proc/{child.pid}").exists()
-    assert list(store.cases.iterdir()) == []
+    assert list(store.everything()) == []
 
 
 def numbers(record):

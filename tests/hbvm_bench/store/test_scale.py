@@ -1,7 +1,6 @@
 """What is done with a large run takes a time that grows with its cases, and no faster."""
 
 from collections import Counter
-from pathlib import Path
 
 import pytest
 
@@ -12,7 +11,7 @@ from tests.hbvm_bench import made_up_run
 
 SMALL, LARGE = 100, 300
 METHODS = 50
-# Reads of the files of one case, its record and its series: measured.
+# Rows of results and arrays that are read for one case: measured.
 READS = {
     "run {run}/campaign.toml --out {run}": 4,
     "show {run}": 1,
@@ -20,7 +19,7 @@ READS = {
     "export {run} --out {out}/cases.csv": 1,
     "export {run} --table timings --out {out}/timings.csv": 1,
     "compare {run} {run}": 2,
-    "merge {run} {other} --out {out}/merged": 3,
+    "merge {run} {other} --out {out}/merged": 8,
 }
 
 
@@ -37,12 +36,18 @@ def runs(tmp_path_factory):
 
 
 @pytest.mark.parametrize(("command", "reads"), READS.items())
-def test_a_file_of_a_case_is_read_a_few_times_and_a_problem_made_once(
+def test_a_row_of_a_case_is_read_a_few_times_and_a_problem_made_once(
     runs, command, reads, monkeypatch, tmp_path, capsys
 ):
-    read, load = Path.read_bytes, problems.load
+    read, load = Store._all, problems.load
     counted, made = Counter(), Counter()
-    monkeypatch.setattr(Path, "read_bytes", lambda path: counted.update([path.parent.name]) or read(path))
+
+    def counting(store, query, *given):
+        rows = read(store, query, *given)
+        counted["rows"] += len(rows) if "results" in query or "arrays" in query else 0
+        return rows
+
+    monkeypatch.setattr(Store, "_all", counting)
     monkeypatch.setattr(
         problems, "load", lambda name, **given: made.update([str(given)]) or load(name, **given)
     )
@@ -51,6 +56,6 @@ def test_a_file_of_a_case_is_read_a_few_times_and_a_problem_made_once(
         counted.clear()
         words = command.format(run=runs[count], other=runs[2], out=tmp_path / str(count))
         assert cli.main(words.split()) == 0
-        found.append(counted["cases"])
+        found.append(counted["rows"])
     assert found[1] - found[0] == reads * (LARGE - SMALL)
     assert max(made.values(), default=0) <= 1

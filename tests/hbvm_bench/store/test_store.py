@@ -1,13 +1,19 @@
+import io
 import json
 import math
 import multiprocessing
+import sqlite3
+import zlib
+from types import SimpleNamespace
 
+import msgspec
 import numpy as np
 import pytest
 
+from hbvm_bench.store import arrays
 from hbvm_bench.store.files import atomic, ensure_writable
 from hbvm_bench.store.records import Compile, Timing, TimingRound, Value
-from hbvm_bench.store.store import Store
+from hbvm_bench.store.store import FILE, Store
 from problems.errors import InputError
 from tests.hbvm_bench import made_up_run
 
@@ -31,32 +37,115 @@ def test_what_is_saved_is_loaded(store):
     assert all(np.array_equal(loaded[k], series[k], equal_nan=True) for k in series)
 
 
-def test_a_missing_cut_or_foreign_record_is_not_there(store):
+def changed(store, statement, *given):
+    """Do to the file what nobody does, from another connection."""
+    with sqlite3.connect(store.path) as other:
+        other.execute(statement, given)
+    other.close()
+
+
+def test_a_missing_or_damaged_record_is_not_there(store):
     assert store.load(ID) is None
     store.save(RECORD)
-    path = store.cases / f"{ID[:24]}.json"
-    whole = path.read_bytes()
-    path.write_bytes(whole[: len(whole) // 2])
+    for text in ("[]", msgspec.json.encode(RECORD).decode()[:-50]):
+        changed(store, "UPDATE results SET record=?", text)
+        assert store.load(ID) is None
+        assert list(store.everything()) == []
+
+
+def npy(header, values=b""):
+    """Return a file with one array of that header, as long as numpy asks headers to be."""
+    text = header.encode().ljust(-(len(header) + 11) % 64 + len(header)) + b"\n"
+    return b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text + values
+
+
+def numpy_file(values):
+    stream = io.BytesIO()
+    np.save(stream, values)
+    return stream.getvalue()
+
+
+HEADER = "{{'descr': '<f8', 'fortran_order': False, 'shape': {}}}"
+WHOLE = arrays.packed(np.arange(100.0))
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"",
+        WHOLE[:50],
+        WHOLE[:-5],
+        zlib.compress(b"no array"),
+        numpy_file(np.array([{"a": 1}], dtype=object)),
+        numpy_file(np.full(3, "x")),
+        numpy_file(np.full(3, 1j)),
+        npy(HEADER.format("(100000000000,)")),
+        npy(HEADER.format("(-1,)"), bytes(64)),
+        npy("{'descr': '<f8', 'shape': ((("),
+        npy("(" * 5000),
+    ],
+)
+def test_an_array_that_is_none_is_refused_in_one_sentence(store, data):
+    store.save(RECORD, {"t": np.arange(3.0)})
+    changed(store, "UPDATE arrays SET data=?", data)
+    with pytest.raises(InputError, match="is damaged"):
+        store.series(ID)
+
+
+def test_an_array_takes_no_more_memory_than_is_allowed(monkeypatch):
+    content = arrays.packed(np.zeros(10**6))  # 8 MB in 8 kB
+    assert len(content) < 10_000
+    monkeypatch.setenv("HBVM_BENCH_MAX_GIB", "0.01")
+    assert arrays.unpacked(content).size == 10**6
+    monkeypatch.setenv("HBVM_BENCH_MAX_GIB", "0.007")
+    with pytest.raises(ValueError, match="HBVM_BENCH_MAX_GIB"):
+        arrays.unpacked(content)
+
+
+def test_a_name_that_is_none_is_not_there(store):
+    store.save(RECORD, {"t": np.arange(3.0), '"><script>': np.ones(3), "../../x": np.ones(3)})
+    assert list(store.series(ID)) == ["t"]
+
+
+def test_a_row_and_its_arrays_are_there_together_or_not_at_all(store):
+    """The second array cannot be stored."""
+    with pytest.raises(ValueError, match="Object arrays cannot be saved"):
+        store.save(RECORD, {"t": WHOLE, "y": None})
     assert store.load(ID) is None
-    path.write_bytes(whole.replace(ID.encode(), ID[::-1].encode()))
-    assert store.load(ID) is None
-    path.write_bytes(b"[]")
-    assert store.load(ID) is None
-
-
-def test_series_that_are_missing_or_cut_are_empty(store):
-    assert store.series(ID) == {}
-    store.save(RECORD, {"t": np.arange(100.0)})
-    path = store.cases / f"{ID[:24]}.npz"
-    path.write_bytes(path.read_bytes()[:50])
     assert store.series(ID) == {}
 
 
-def test_pickles_are_not_read(store):
-    store.save(RECORD)
-    with (store.cases / f"{ID[:24]}.npz").open("wb") as stream:
-        np.savez(stream, t=np.array([{"a": 1}], dtype=object))
-    assert store.series(ID) == {}
+def test_a_full_disk_is_one_sentence_and_leaves_what_there_was(store):
+    store.save(RECORD, {"t": np.arange(3.0)})
+    store._database.execute("PRAGMA max_page_count=20")
+    noise = np.random.default_rng(1).standard_normal(10**5)
+    with pytest.raises(InputError, match=r"cannot read or write .*: No space left on device"):
+        store.save(made_up_run.record("other()"), {"t": noise})
+    assert [one.id for one in store.everything()] == [ID]
+    assert store.series(ID)["t"].tolist() == [0.0, 1.0, 2.0]
+
+
+def test_a_run_ends_as_one_file(store):
+    with store.locked():
+        store.save(RECORD)
+        assert {path.name for path in store.directory.iterdir()} >= {FILE, f"{FILE}-wal"}
+    assert {path.name for path in store.directory.iterdir()} == {FILE}
+
+
+def test_others_read_while_a_run_writes(store):
+    with store.locked():
+        store.save(RECORD)
+        assert Store(store.directory).load(ID) == RECORD
+
+
+def test_there_is_no_log_of_transactions_on_a_file_system_of_a_network(tmp_path, monkeypatch):
+    kind = SimpleNamespace(mountpoint=str(tmp_path), fstype="nfs4")
+    monkeypatch.setattr("psutil.disk_partitions", lambda **_: [kind])
+    made = Store(tmp_path / "run")
+    made.prepare()
+    assert made._database.execute("PRAGMA journal_mode").fetchone() == ("delete",)
+    made.save(RECORD)
+    assert Store(tmp_path / "run").load(ID) == RECORD
 
 
 def test_a_file_is_whole_or_not_there(tmp_path):
@@ -103,7 +192,9 @@ def test_no_metric_is_nan_or_infinite(bad):
 
 def test_a_record_is_json_that_anyone_can_read(store):
     store.save(made_up_run.record(id=ID, outcome="stalled", status="stalled", t_stop=8.5, reason='"<é>'))
-    text = (store.cases / f"{ID[:24]}.json").read_text(encoding="utf-8")
+    with sqlite3.connect(store.path) as other:
+        ((text,),) = other.execute("SELECT record FROM results").fetchall()
+    other.close()
     parsed = json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} in JSON"))
     assert parsed["result"]["reason"] == '"<é>'
 
@@ -113,9 +204,9 @@ def test_a_directory_without_a_run_says_so(tmp_path):
         Store(tmp_path).index()
     with pytest.raises(InputError, match="does not exist"):
         Store(tmp_path / "nowhere").index()
-    (tmp_path / "campaign.json").write_text('{"x": 1}')
-    with pytest.raises(InputError, match="not the index"):
-        Store(tmp_path).index()
+    Store(tmp_path / "new").prepare()
+    with pytest.raises(InputError, match="has no run yet"):
+        Store(tmp_path / "new").index()
 
 
 def test_a_place_that_cannot_be_written_is_refused_and_left_as_it_was(tmp_path):

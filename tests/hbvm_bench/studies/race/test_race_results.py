@@ -13,9 +13,8 @@ from hbvm_bench.report.figures.style import looks
 from hbvm_bench.report.markdown import printed
 from hbvm_bench.report.page import gather, page_of
 from hbvm_bench.report.write import write
-from hbvm_bench.store import archive
-from hbvm_bench.store.archive import opened
 from hbvm_bench.store.records import Load
+from hbvm_bench.store.store import PACKED, opened
 from hbvm_bench.studies.race import report, results, tables
 from hbvm_bench.studies.race.figures import work_precision
 from hbvm_bench.summaries import standings
@@ -30,7 +29,7 @@ def test_a_stored_race_is_read_back_equal(race, tmp_path):
     save(race, tmp_path)
     (found,) = results.races_of(gather(opened([tmp_path])))
     assert (found.entry, found.run, found.records) == (race.entry, race.run, race.records)
-    assert [p.name for p in tmp_path.iterdir()] == [archive.NAME]  # no temporary file is left
+    assert [p.name for p in tmp_path.iterdir()] == [PACKED]  # no temporary file is left
 
 
 def test_compile_times_that_are_none_are_refused(race):
