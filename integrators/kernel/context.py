@@ -50,9 +50,9 @@ Integers = NDArray[np.int64]
 # pushes back to a switching surface from both sides. ACTS: an event in the step changes the state.
 # ACCUMULATE: such events come after ever shorter times. ANEW: one has happened within a step of fixed size,
 # and steps are counted from there. RENEW: one has changed parameters, and what follows from them is not yet
-# renewed.
+# renewed. NOISY: the field's noise keeps the equations of the step from being solved.
 RUNNING, DONE, DIVERGED, NOT_FINITE, BUDGET, UNDERFLOW, SCATTERED, NOT_KEPT, HALTED = range(9)
-UNSCALED, MISSED, SLIDING, ACTS, ACCUMULATE, ANEW, RENEW = range(9, 16)
+UNSCALED, MISSED, SLIDING, ACTS, ACCUMULATE, ANEW, RENEW, NOISY = range(9, 17)
 
 # How states between steps are made.
 PARTIAL, STOP, DENSE = range(3)

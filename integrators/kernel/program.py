@@ -37,6 +37,7 @@ from integrators.kernel.step.rule import (
     LONGEST,
     MOST_TRUSTED,
     PART_OF_TOLERANCE,
+    STAGNATION,
     TOLERANCE,
     TRUSTED,
     UNTESTED,
@@ -431,7 +432,7 @@ class HBVMProgram(Compiled):
         tables = {**self._fixed, **({} if partial else self.scaled(self.h))}
         more = {"energy.rows": self.system.dim + 1} if self.projected else self._more
         context = self.kept.context(self.shape, tables) if self.kept else Context(self.shape, tables, more)
-        context.solver.tolerance = TOLERANCE
+        context.solver.tolerance, context.solver.stagnation = TOLERANCE, STAGNATION
         context.solver.log_residual = LOG_RESIDUAL
         return context
 

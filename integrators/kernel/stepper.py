@@ -663,6 +663,18 @@ def accumulated(t: float) -> tuple[Status, str]:
     )
 
 
+NOISE_MARGIN = 100.0  # times what noise adds in a step is a tolerance that can be had
+NOISE_AT_MOST = 1e-3
+"""Relative change at which an iteration may stagnate because of noise; above it, it has not converged."""
+
+
+def remedy(added: float) -> str:
+    """Return what helps against noise that adds such a part of the state in a step."""
+    tolerance = 10.0 ** math.ceil(math.log10(NOISE_MARGIN * added))
+    smooth = "give a field that is smooth to rounding"
+    return smooth if tolerance > NOISE_AT_MOST else f"{smooth}, or tol={tolerance:.0e} or more"
+
+
 def failure(
     outcome: int, program: Program, contexts: tuple[Context, Context], t: float, solver: str = "fixed-point"
 ) -> tuple[Status, str]:
@@ -676,6 +688,12 @@ def failure(
         return Status.NONLINEAR_DIVERGENCE, (
             f"the equations of the step from t = {t!r}, h = {ctx.h!r} have no solution near "
             "the trajectory: the one found oscillates within the step; take a smaller h."
+        )
+    best, last = ctx.solver.best, ctx.solver.last
+    if best < NOISE_AT_MOST and last < 100.0 * best:
+        return Status.NONLINEAR_DIVERGENCE, (
+            f"the values of the vector field have noise: in the step from t = {t!r}, h = {ctx.h!r}, the "
+            f"changes of the iteration stop decreasing at {best:.0e} of the state's size; {remedy(best)}."
         )
     return Status.NONLINEAR_DIVERGENCE, (
         f"the {solver} iteration did not converge in the step from t = {t!r}, "

@@ -11,6 +11,7 @@ from integrators.kernel.context import (
     BUDGET,
     DENSE,
     DONE,
+    NOISY,
     PARTIAL,
     SLIDING,
     STOP,
@@ -21,7 +22,7 @@ from integrators.kernel.context import (
 )
 from integrators.kernel.parts.discontinuities import MOST_RECORDED, NOTHING, START
 from integrators.kernel.step.rule import FIRST_AT_REST, RESTART, SCALE_LASTS
-from integrators.kernel.stepper import Ended, HBVMStepper, Program
+from integrators.kernel.stepper import Ended, HBVMStepper, Program, remedy
 from integrators.options import SHORTEST, SMALLEST
 from integrators.protocol import Array, Samples, Status
 from integrators.refusals import one_thread
@@ -392,6 +393,12 @@ class AdaptiveStepper(HBVMStepper):
             return Status.STEP_UNDERFLOW, (
                 f"no step from t = {self.t!r} is short enough for tol={self._program.tol!r}; "
                 "the solution may end or be singular here."
+            )
+        if outcome == NOISY:
+            added = self._context.estimate.added
+            return Status.NONLINEAR_DIVERGENCE, (
+                f"the values of the vector field have noise: in a step of h = {self._context.h!r} from "
+                f"t = {self.t!r} it adds {added:.0e} of the state's size; {remedy(added)}."
             )
         if outcome == SLIDING:
             return Status.SLIDING, (

@@ -26,6 +26,7 @@ from integrators.kernel.step.rule import (
     LOG_RESIDUAL,
     LOG_RESIDUAL_VARYING,
     MOST_IN_LANES,
+    STAGNATION,
     TOLERANCE,
 )
 
@@ -462,7 +463,7 @@ class Steps(Writer):
         best, stalled, rate, converged, residual = judge(
             largest_change, self.load(self.last), best, self.load(self.stalled), rate, count, TOLERANCE, 0.0
         )
-        over = converged | stagnates(self.load(floored_change), stalled)
+        over = converged | stagnates(self.load(floored_change), stalled, STAGNATION)
         log_residual = LOG_RESIDUAL_VARYING if form.varying else LOG_RESIDUAL
         more = where(over, further(residual_at_end(converged, residual, best), rate, log_residual), INFINITY)
         left = more.where(undecided, self.load(self.left))

@@ -73,11 +73,13 @@ def iterate(ctx, m, which):
         stalled = 0 if change < best else stalled + 1
         best = min(best, change)
         if stalled and is_rounding(
-            floored_change, stalled >= STAGNATION_LIMIT and not floored_change < STILL_CONVERGING * before
+            floored_change,
+            stalled >= STAGNATION_LIMIT and not floored_change < STILL_CONVERGING * before,
+            ctx.solver.stagnation,
         ):
             break
         hopeless = 0 if floored_change < before else hopeless + 1
-        if hopeless == STAGNATION_LIMIT and floored_change < STAGNATION:
+        if hopeless == STAGNATION_LIMIT and floored_change < ctx.solver.stagnation:
             break
         if hopeless == HOPELESS:
             return DIVERGED

@@ -23,6 +23,7 @@ class Estimate(Part):
     steepest = Array("blocks.count")  # and slope
     noise = Array("blocks.count")  # coefficients that rounding explains; see `step.rounding`
     largest = Array("blocks.groups")  # the largest size, as a velocity, that a block of each group has had
+    added = Real()  # what noise adds in a step that it has kept from being solved, relative
     line = Real()  # part of a step on which noise is measured; 0: it is not
     measured = Integer()  # 1: noise was measured in the step that was estimated
     evident_error = Real()  # the estimated errors, of what is more than rounding in any field

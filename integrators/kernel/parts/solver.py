@@ -19,4 +19,5 @@ class Solver(Part):
     tolerance = Real()  # the relative change at which the iteration has converged
     trusted = Real()  # a change from which on adaptive steps iterate without a test,
     log_trusted = Real()  # and the binary logarithm of one before which they do
+    stagnation = Real()  # a change above which one that stops decreasing is a failure
     log_residual = Real()  # binary logarithm of what may be left of a change when the step is solved

@@ -27,7 +27,15 @@ from integrators.kernel.step.coefficients import (
 )
 from integrators.kernel.step.control import INFINITY, TINY, is_good
 from integrators.kernel.step.fixed_point import evaluate
-from integrators.kernel.step.rounding import beyond_noise, is_evident, known_noise, measure_noise
+from integrators.kernel.step.rounding import (
+    beyond_noise,
+    is_evident,
+    known_noise,
+    largest_in_group,
+    measure_noise,
+    momentum,
+    note_sizes,
+)
 from integrators.kernel.step.rule import FIRST_AT_REST, LEAST_BLOCK, RESTART, SMALLEST
 
 # Part of a block that rounding accounts for in a step that the fixed-point iteration solves
@@ -198,13 +206,6 @@ def note_slow_decay(ctx):
 
 
 @compiled
-def momentum(ctx, d):
-    """Return the component of the state whose slope is row d of the field."""
-    i = 8 * (d // 4) + d % 4 if ctx.second else d
-    return ctx.state[i]
-
-
-@compiled
 def own_size(ctx, b):
     """Return the size of a block in the step that is estimated, unless that is next to nothing."""
     return size_in_step(ctx.estimate.scale[b], ctx.estimate.fastest[ctx.blocks.group[b]] * ctx.blocks.mass[b])
@@ -276,16 +277,6 @@ def estimate_beyond_noise(ctx, error, quadrature_error):
 
 
 @compiled
-def note_sizes(ctx):
-    """Let the largest sizes of the groups be at least those of the present state."""
-    blocks, largest = ctx.blocks, ctx.estimate.largest
-    for d in range(ctx.rows):
-        b = blocks.of_row[d]
-        g = blocks.group[b]
-        largest[g] = greatest(size(momentum(ctx, d)) * blocks.speed[b], largest[g])
-
-
-@compiled
 def judge_blocks(ctx):
     """Return the two errors that `estimate` returns, from the coefficients."""
     discontinuities = ctx.discontinuities
@@ -311,7 +302,7 @@ def judge_blocks(ctx):
         slope = floored_slope(slopes[b], steepest, ctx.estimate.least_slope)
         if slope > 0.0:
             own, scale = own_size(ctx, b), block_size(ctx, b)
-            largest = ctx.estimate.largest[ctx.blocks.group[b]] * ctx.blocks.mass[b]
+            largest = largest_in_group(ctx, b)
             gamma_error, gamma_last, high = (
                 ctx.estimate.gamma_error[b],
                 ctx.estimate.gamma_last[b],

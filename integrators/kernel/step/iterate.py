@@ -34,7 +34,9 @@ def test(ctx, moved):
     solver.best, solver.stalled = best, int(stalled)
     if stalled > 0.0 and blocks.age < SIZES_LAST and ctx.varying == 0:
         take_sizes(ctx)  # of now: what has grown since is moved by more rounding
-    if converged or (stalled > 0.0 and stagnates(change(ctx, blocks.floored_weights), stalled)):
+    if converged or (
+        stalled > 0.0 and stagnates(change(ctx, blocks.floored_weights), stalled, solver.stagnation)
+    ):
         left = residual_at_end(converged, residual, best)
         if left > 0.0:
             extra_iterations(ctx, left)

@@ -12,7 +12,8 @@ from math import copysign
 from integrators.kernel.native.jit import compiled, for_both_widths
 from integrators.kernel.parts.estimate import AFTER_MIDDLE, BEFORE_LAST, LAST, MIDDLE
 from integrators.kernel.simd.memory import get, put, splat8, total
-from integrators.kernel.simd.operations import greatest, where
+from integrators.kernel.simd.operations import greatest, size, where
+from integrators.kernel.step.begin import start_plain
 from integrators.kernel.step.coefficients import coefficient
 from integrators.kernel.step.control import INFINITY
 from integrators.kernel.step.fixed_point import evaluate
@@ -23,9 +24,9 @@ from integrators.kernel.step.stages import offset
 # noisy of two lines: of normally distributed ones smaller than a tenth of their deviation in one measurement
 # of 13,000; those of a step that rounding makes are up to four deviations.
 BEYOND_NOISE = 40.0
-# Part of the largest size in the group: what noise adds to a block in a step is not more, or the iteration
-# would not converge; a coefficient ten times as large is none of rounding, in any field.
-MOST_NOISE, EVIDENT = STAGNATION, 10.0 * STAGNATION
+# Part of the largest size in the group: what rounding adds to a block in a step is a tenth at most, or the
+# iteration would not converge.
+EVIDENT = 10.0 * STAGNATION
 # Of a component: a line on which it moves by so little tells nothing of the field but noise.
 LEAST_WAY = 2.0**-46
 
@@ -62,18 +63,73 @@ def measure_noise(ctx):
 
     A discontinuity is on one of them at most.
     """
-    estimate, blocks = ctx.estimate, ctx.blocks
-    if not estimate.line > 0.0:
+    if not ctx.estimate.line > 0.0:
         return
+    measure_on_both_lines(ctx)
+    noise = ctx.estimate.noise
+    for b in range(ctx.blocks.count):
+        if not abs(ctx.h) * noise[b] <= ctx.solver.stagnation * largest_in_group(ctx, b):
+            noise[b] = 0.0
+    ctx.estimate.measured = 1
+
+
+@compiled
+def largest_in_group(ctx, b):
+    """Return the largest size that a block of the group of block b has had, for the mass of that."""
+    return ctx.estimate.largest[ctx.blocks.group[b]] * ctx.blocks.mass[b]
+
+
+@compiled
+def measure_on_both_lines(ctx):
+    """Set `Estimate.noise` of each block, whatever it is."""
+    estimate = ctx.estimate
     noise, other = estimate.noise, estimate.slow_decay
     measure_on_line(ctx, ctx.state, estimate.line, 0.0, noise)
     measure_on_line(ctx, ctx.next_state, -estimate.line, ctx.h, other)
-    for b in range(blocks.count):
-        least = min(noise[b], other[b])
-        largest = estimate.largest[blocks.group[b]] * blocks.mass[b]
-        noise[b] = least if abs(ctx.h) * least <= MOST_NOISE * largest else 0.0
+    for b in range(ctx.blocks.count):
+        noise[b] = min(noise[b], other[b])
     ctx.counters.evaluations += 2 * ctx.k
-    estimate.measured = 1
+
+
+@compiled
+def noise_in_step(ctx):
+    """Return what noise adds in the attempted step, which has failed: the largest part of a size in a group.
+
+    The end of the step, which is unknown, is taken from the field at its start.
+    """
+    start_plain(ctx)
+    evaluate(ctx)
+    for d in range(ctx.rows):
+        if ctx.second:
+            i = 8 * (d // 4) + d % 4
+            ctx.next_state[i + 4] = ctx.state[i + 4] + ctx.h * ctx.factors.velocity[d] * ctx.state[i]
+        else:
+            ctx.next_state[d] = ctx.state[d] + ctx.h * ctx.values[ctx.lanes * d]
+    note_sizes(ctx)
+    measure_on_both_lines(ctx)
+    most = 0.0
+    for b in range(ctx.blocks.count):
+        added, largest = abs(ctx.h) * ctx.estimate.noise[b], largest_in_group(ctx, b)
+        if largest > 0.0:
+            most = max(most, added / largest)
+    return most
+
+
+@compiled
+def note_sizes(ctx):
+    """Let the largest sizes of the groups be at least those of the present state."""
+    blocks, largest = ctx.blocks, ctx.estimate.largest
+    for d in range(ctx.rows):
+        b = blocks.of_row[d]
+        g = blocks.group[b]
+        largest[g] = greatest(size(momentum(ctx, d)) * blocks.speed[b], largest[g])
+
+
+@compiled
+def momentum(ctx, d):
+    """Return the component of the state whose slope is row d of the field."""
+    i = 8 * (d // 4) + d % 4 if ctx.second else d
+    return ctx.state[i]
 
 
 @compiled

@@ -47,6 +47,7 @@ def switch_if_slow(ctx, outcome):
 @compiled
 def solve_part(ctx, partial):
     """Solve a partial step of ``ctx``, prepared in ``partial``; return the outcome."""
+    partial.solver.stagnation = ctx.solver.stagnation
     if ctx.implicit.active:
         return solve_implicitly(ctx, partial, 1)
     outcome = iterate_to_end(partial)

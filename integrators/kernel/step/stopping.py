@@ -130,18 +130,20 @@ def takes_too_long(change, rate, tries, log_residual, target):
 
 
 @for_both_widths
-def is_rounding(change, repeated):
+def is_rounding(change, repeated, most):
     """Whether rounding accounts for a change that does not decrease; ``repeated``: not for the first time.
+
+    Then it may be as large as ``most``.
 
     The change is relative to the size of its block, small blocks raised to a part of the largest.
     """
-    return change < where(repeated, STAGNATION, ROUNDING)
+    return change < where(repeated, most, ROUNDING)
 
 
 @for_both_widths
-def stagnates(change, stalled):
-    """Whether an iteration is over whose changes, of this size now, have ``stalled`` so often."""
-    return (stalled > 0.0) & is_rounding(change, stalled >= STAGNATION_LIMIT)
+def stagnates(change, stalled, most):
+    """Whether an iteration is over whose changes have ``stalled`` so often, and are of this size now."""
+    return (stalled > 0.0) & is_rounding(change, stalled >= STAGNATION_LIMIT, most)
 
 
 @for_both_widths

@@ -9,6 +9,7 @@ from integrators.kernel.context import (
     BY_VALUES,
     DIVERGED,
     DONE,
+    NOISY,
     NOT_KEPT,
     RUNNING,
     SCATTERED,
@@ -53,7 +54,15 @@ from integrators.kernel.step.fixed_point import iterate_measured
 from integrators.kernel.step.graze import grazes
 from integrators.kernel.step.iterate import end_iteration, extra_iterations, iterate_to_end, test
 from integrators.kernel.step.reversible import keep_pace
-from integrators.kernel.step.rule import FARTHEST, FIRST_RATE, ROUNDING, SCALE_LASTS, SHORTEST_PART
+from integrators.kernel.step.rounding import noise_in_step
+from integrators.kernel.step.rule import (
+    FARTHEST,
+    FIRST_RATE,
+    ROUNDING,
+    SCALE_LASTS,
+    SHORTEST_PART,
+    STAGNATION,
+)
 from integrators.kernel.step.solver_switch import request_solver, solve_implicitly
 from integrators.kernel.step.stopping import rate_at_zero, rate_since, takes_too_long, untested
 from integrators.kernel.step.sums import time_after
@@ -86,6 +95,9 @@ MOST_ATTEMPTS = 24
 # than such a part of the interval.
 STALL_PART = 1e-4
 STALL_CHECK_EVERY, STALL_CHECKS = 256, 32
+# What noise adds in a step, relative: the iteration stagnates at so many times as much. Nobody waits for the
+# steps, a thousand times as short, that would make up for more than the other number.
+NOISE_MARGIN, MOST_NOISE = 10.0, 1e3 * STAGNATION
 STEADY = 1.2  # an implicit step that could be longer by less keeps its length, and so the factors
 
 
@@ -305,10 +317,30 @@ def solve_adaptive(ctx):
         if accepts(ctx, outcome, ctx.counters.iterations - before, implicit):
             ctx.solved = BY_VALUES
             return DONE
+        if outcome in (DIVERGED, SCATTERED) and is_noisy(ctx):
+            return NOISY
         if ctx.discontinuities.undone:
             undo(ctx)
             begin_attempts(ctx)
         failure = UNDERFLOW if outcome == DONE else outcome
+
+
+@compiled
+def is_noisy(ctx):
+    """Whether the field's noise keeps the attempted step from being solved, and far shorter ones too.
+
+    Of noise that is less than the tolerance the iteration need not do better.
+    """
+    solver, controller = ctx.solver, ctx.controller
+    if not ctx.estimate.line > 0.0:
+        return False
+    ctx.estimate.added = added = noise_in_step(ctx)
+    if NOISE_MARGIN * added <= solver.stagnation:
+        return False
+    if NOISE_MARGIN * added <= controller.allowed_error:
+        solver.stagnation = NOISE_MARGIN * added
+        return False
+    return added > MOST_NOISE
 
 
 @compiled

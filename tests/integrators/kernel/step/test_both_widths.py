@@ -25,7 +25,7 @@ LANES, ROWS = 8, 8
 
 def stopping(t, y, par, out):
     best, stalled, rate, converged, rest = judge(y[0], y[1], y[2], y[3], -y[4], y[5], y[6], 0.0)
-    over = converged | stagnates(y[7], stalled)
+    over = converged | stagnates(y[7], stalled, 1e-13)
     out[0], out[1], out[2] = best, stalled, rate
     out[3] = where(over, further(residual_at_end(converged, rest, best), rate, -61.0), -1.0)
 
