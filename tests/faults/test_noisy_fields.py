@@ -1,4 +1,4 @@
-"""Fields whose values have noise: the run ends at once and says how much, or does what the tolerance allows."""
+"""Fields whose values have noise: the run ends and says how much, or does what the tolerance allows."""
 
 import numpy as np
 import pytest
