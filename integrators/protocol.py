@@ -34,9 +34,9 @@ by `offers`; without it the method still integrates. The conformance kit checks 
 10. `Checkpoints`: ``checkpoint`` returns all data that a bitwise identical continuation needs, with the
     identity of the integration (`integrators.running.checkpoints.Identity`); ``restore`` accepts only such a
     checkpoint. Checkpoint files need it (``integrate(checkpoint=...)``).
-11. `Destination`: the attribute ``destination`` of a stepper that stops when its steps collapse is the end
-    of the whole integration, which `integrate` reaches in pieces. `integrators.running.watchdog` has the
-    rule.
+11. `Destination`: the attribute ``destination`` of a stepper is the end of the whole integration, which
+    `integrate` reaches in pieces. The vector field is not evaluated beyond it: the last step is shortened.
+    Whether steps have collapsed is judged by the way to it, see `integrators.running.watchdog`.
 12. `KeptError`: after ``USER_ERROR``, ``error`` is the exception raised by a user function.
 13. `Events`: ``with_events`` of a program starts steppers that search their steps for events. Such an
     `EventStepper` has the ``search``, and ``look_to``, which searches the next step up to the last time.
@@ -77,6 +77,7 @@ from problems import deprecated
 from problems.checks import CheckedOptions
 from problems.errors import InputError, shown
 from problems.problem import Problem, System, check_is_problem
+from problems.systems.opaque import Opaque
 
 __all__ = [
     "CAPABILITIES",
@@ -168,6 +169,14 @@ class UserError(Exception):
         said = " ".join(str(error).split())
         super().__init__(f"a function of yours raised {type(error).__name__}{f' ({said})' if said else ''}")
         self.error = error
+
+
+def undefined_in(system: System) -> Exception | None:
+    """Return what a user's field raised where it is not defined (`ArithmeticError`, `ValueError`), if it did.
+
+    Its value is NaN there, and a shorter step may avoid the place; where none does, this is why.
+    """
+    return system.undefined if isinstance(system, Opaque) else None
 
 
 @dataclass
@@ -380,8 +389,8 @@ class Samplings(Protocol):
 class Destination(Protocol):
     """A stepper that knows the end of the whole integration, which ``advance`` reaches in pieces.
 
-    A stepper that detects stalled integrations compares its progress with this distance, not with that of a
-    piece. The samples do not depend on it.
+    It does not evaluate the vector field beyond it: the last step is shortened. A stepper that detects
+    stalled integrations compares its progress with this distance, not with that of a piece.
 
     Attributes
     ----------
@@ -398,7 +407,8 @@ class KeptError(Protocol):
     Attributes
     ----------
     error : Exception or None
-        The original exception, if the status is ``USER_ERROR``.
+        The original exception, if the status is ``USER_ERROR``, or if a field is not defined where the
+        integration has failed.
     """
 
     error: Exception | None

@@ -26,6 +26,7 @@ from integrators.protocol import (
     Status,
     UserError,
     sampling_named,
+    undefined_in,
 )
 from integrators.refusals import (
     are_finite,
@@ -40,6 +41,7 @@ from integrators.running.times import plan
 from integrators.running.watchdog import StallDetector
 from problems.errors import unknown
 from problems.problem import System
+from problems.systems.opaque import Opaque
 
 WHOLE = 1e-6  # of a step, which is rounding where steps are counted
 
@@ -69,6 +71,8 @@ class ProgramBase(Compiled):
         values = check_parameters(par, self.system)
         stepper = self.stepper(check_state(y0, self.system.dim), values, check_start(t0))
         stepper.started = self, values
+        if isinstance(self.system, Opaque):
+            self.system.forget_undefined()
         return stepper
 
     def stepper(self, y: Array, par: Array, t: float) -> "StepperBase":
@@ -219,6 +223,9 @@ class StepperBase:
         """End with the state ``y``, reached at ``t``; where one of them is not finite, at the present."""
         if math.isfinite(t) and are_finite(y):
             self._arrive(t, y)
+        undefined = undefined_in(self.started[0].system) if self.error is None else None
+        if undefined is not None and status in (Status.NOT_FINITE, Status.STEP_UNDERFLOW):
+            self.error, reason = undefined, f"{reason} There {UserError(undefined)}."
         self._status, self._reason = status, reason
 
     def _towards(self, end: float) -> float | None:

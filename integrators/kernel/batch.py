@@ -158,7 +158,7 @@ class Work:
             result.y[i], result.t_stop[i], result.status[i] = np.nan, self.t0, Status.USER_ERROR
             result.reason[i] = f"{raised} at the start, t = {self.t0!r}."
             return
-        stepper.stop = self.stop
+        stepper.stop, stepper.destination = self.stop, float(result.t[-1])
         samples = stepper.advance(result.t, sample=self.sample)
         ending, count = self.ending(i, stepper, samples)
         result.y[i, :count] = self.states(stepper, samples)[:count]

@@ -7,12 +7,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from integrators.kernel.context import ADVANCE, ANEW, BUDGET, DENSE, DONE, PARTIAL, STOP, Context
-from integrators.kernel.stepper import HBVMStepper
+from integrators.kernel.stepper import Ended, HBVMStepper
 from integrators.protocol import Array, Samples, Status
 from integrators.refusals import check_state, one_thread
 from integrators.running.times import plan
 
 MOST = 1 << 60  # steps or samples
+ROUNDINGS = 4  # units in the last place of time by which a step may seem to pass the end
 FEW, GROWTH = 64, 4  # of them that are planned at a time after an event, and how these become more
 
 
@@ -44,6 +45,8 @@ class FixedStepper(HBVMStepper):
         return self._samples(times[: len(states)], states, outcome, reason)
 
     def _one_step(self) -> bool:
+        if abs(self._context.h) != self._program.h:
+            return False
         numbers, call, _ = self._for_one_step
         numbers.view(np.int64)[0] = self._context.n + 1
         return self._is_one(self._enter(call), DONE)
@@ -56,16 +59,19 @@ class FixedStepper(HBVMStepper):
     @one_thread
     def take(self, count: int) -> Samples:
         """Take ``count`` steps and return them."""
+        self._restore_length()
         return self._steps(self._context.n + 1, None, count)
 
     @one_thread
     def march(self, end: float, most: int) -> Samples:
         """Take steps, ``most`` at most and none beyond the time ``end``; return them."""
+        self._restore_length()
         if (end - self.t) * self._context.h < 0.0:
             self._turn(self.t)
         return self._steps(self._context.n + 1, end, most)
 
     def _advance(self, grid: Array, sample: str) -> Samples:
+        self._restore_length()
         t = self.t
         goal = self.destination if self.destination is not None and grid[-1] == t else grid[-1]
         if (goal - t) * self._context.h < 0.0:  # steps are counted from here
@@ -86,12 +92,56 @@ class FixedStepper(HBVMStepper):
             bases = np.full(piece.size, ctx.t0)
             if between == STOP:
                 bases[1:] = piece[:-1]
-            states, outcome, reason = self._fill(between, piece, *plan(piece, bases, ctx.h))
+            steps, parts = plan(piece, bases, ctx.h)
+            if between != STOP and parts[-1] and self._passes_end(steps[-1] + 1):
+                whole = int(
+                    np.searchsorted(steps, steps[-1]) + np.count_nonzero(parts[steps == steps[-1]] == 0.0)
+                )
+                if not whole:
+                    outcome, reason = self._shorten(int(steps[-1]))
+                    continue
+                piece, steps, parts = piece[:whole], steps[:whole], parts[:whole]
+            states, outcome, reason = self._fill(between, piece, steps, parts)
             pieces.append(states)
             done += len(states)
             size = FEW if outcome == ANEW else GROWTH * size
-        states = pieces[0] if len(pieces) == 1 else np.concatenate(pieces)
+        states = pieces[0] if len(pieces) == 1 else np.concatenate([np.empty((0, self._dim)), *pieces])
         return self._samples(grid[:done], states, outcome, reason)
+
+    def _passes_end(self, step: int) -> bool:
+        """Whether a step of a certain number ends beyond the end of the whole integration."""
+        ctx, end = self._context, self.destination
+        if end is None or (end - self.t) * ctx.h <= 0.0:
+            return False
+        last = ctx.t0 + step * ctx.h
+        return (last - end) * ctx.h > 0.0 and abs(last - end) > ROUNDINGS * math.ulp(
+            max(abs(last), abs(ctx.t0))
+        )
+
+    def _shorten(self, last: int) -> tuple[int, Ended | None]:
+        """Go to step number ``last``, and let the next one end at the end; return how that went."""
+        ctx, outcome, reason = self._context, ANEW, None
+        if ctx.n < last:
+            _, outcome, reason = self._fill(
+                PARTIAL, np.array([ctx.t0 + last * ctx.h]), np.array([last]), np.zeros(1)
+            )
+            if outcome != DONE or reason is not None:
+                return outcome, reason
+        assert self.destination is not None
+        self._count_from_here(self.destination - self.t)
+        return ANEW, reason
+
+    def _restore_length(self) -> None:
+        """Go on with steps of the usual length if the last one was shortened."""
+        ctx, end = self._context, self.destination
+        if abs(ctx.h) != self._program.h and (ctx.n or end is None or end - ctx.t0 != ctx.h):
+            self._count_from_here(math.copysign(self._program.h, ctx.h))
+
+    def _count_from_here(self, h: float) -> None:
+        """Count steps of another length from the present on."""
+        self._context.t0, self._context.n = self.t, 0
+        self._forget()
+        self._set_step(h)
 
     def _steps(self, first: int, end: float | None, most: int = MOST) -> Samples:
         """Take steps from number ``first`` on, ``most`` at most and none beyond ``end``; return them.
@@ -137,6 +187,6 @@ class FixedStepper(HBVMStepper):
         """Reverse the direction, here, at time ``t0``; what lay ahead lies behind and is forgotten."""
         ctx = self._context
         ctx.t0, ctx.n = t0, 0
-        self._set_step(-ctx.h)
+        self._set_step(-math.copysign(self._program.h, ctx.h))
         ctx.events.acted = -math.copysign(math.inf, ctx.h)  # the same event may happen on the way back
         self._forget()

@@ -44,17 +44,29 @@ from integrators.kernel.tables import Constants
 from integrators.kernel.tangent.frames import Frames
 from integrators.kernel.tangent.group import Directions
 from integrators.kernel.tangent.vectors import Vectors
-from integrators.protocol import SAMPLINGS, Array, Samples, Stats, Status, UserError, sampling_named
+from integrators.protocol import (
+    SAMPLINGS,
+    Array,
+    Samples,
+    Stats,
+    Status,
+    UserError,
+    sampling_named,
+    undefined_in,
+)
 from integrators.refusals import check_times, one_thread
 from integrators.running.checkpoints import Identity
 from integrators.running.times import Counts
 from integrators.running.watchdog import StallDetector
 from problems.errors import InputError, unknown
 from problems.problem import System
+from problems.systems.opaque import Opaque
 
 CHUNK = 1 << 14  # steps between two looks at Ctrl-C, at most
 CHUNK_WITH_EVENTS = 1 << 10  # the same where a step may take as long as many
 SHORTEST_TIME = 64  # units in the last place: nothing happens in a time as short
+# What a field that is not defined somewhere may lead to.
+FROM_UNDEFINED = (Status.NOT_FINITE, Status.STEP_UNDERFLOW, Status.NONLINEAR_DIVERGENCE)
 FIRST_HELD = 16  # steps for which the implicit solver stays at work when it is made; `solve` has more
 
 Ended = tuple[Status, str]  # how a run is over before its end, and the reason as a sentence
@@ -172,6 +184,8 @@ class HBVMStepper(ABC):
         self._program = program
         self._implicit: tuple[Workspace, Workspace] | None = None
         self._dim, self._pace = y.size, Pace(CHUNK, y.size)
+        if isinstance(program.system, Opaque):
+            program.system.forget_undefined()
         self._status, self._reason = Status.RUNNING, ""
         self._pair, self._par = program.pair(par), par
         pair = self._pair
@@ -271,7 +285,7 @@ class HBVMStepper(ABC):
                 if samples.status is not Status.FINISHED:
                     reason = f"{samples.reason} Events are known up to t = {self.t!r} only."
                     search.trouble = samples.status, reason, self.error
-            if self._status is Status.RUNNING:
+            if self._status is Status.RUNNING and self._context.solved:
                 search.finish(end)
         return self._status
 
@@ -629,7 +643,11 @@ class HBVMStepper(ABC):
 
     def _samples(self, t: Array, y: Array, outcome: int, reason: "Ended | None" = None) -> Samples:
         if reason is None and outcome not in (DONE, BUDGET):
-            reason = self._failure(outcome)
+            status, sentence = self._failure(outcome)
+            error = undefined_in(self._program.system) if self.error is None else None
+            if error is not None and status in FROM_UNDEFINED:
+                self.error, sentence = error, f"{sentence} There {UserError(error)}."
+            reason = status, sentence
         if reason is not None:
             self._status, self._reason = reason
         if self._vectors:

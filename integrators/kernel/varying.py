@@ -83,7 +83,12 @@ class AdaptiveStepper(HBVMStepper):
         return extra
 
     def _one_step(self) -> bool:
-        if self._breakpoints.size or self._max_steps is not None:
+        stop = self._context.controller.numbers.stop
+        if (
+            self._breakpoints.size
+            or self._max_steps is not None
+            or (math.isfinite(stop) and self._is_at(stop))
+        ):
             return False
         ends, call, _ = self._for_one_step
         ends[0] = LATEST if self._context.controller.next_length > 0.0 else -LATEST
@@ -110,15 +115,20 @@ class AdaptiveStepper(HBVMStepper):
         return self._to(grid, {"stop": STOP, "dense": DENSE}.get(sample, PARTIAL))
 
     def _stop(self) -> float:
-        """Return the next breakpoint ahead, which no step passes; infinitely far if there is none."""
-        ctx, points = self._context, self._breakpoints
-        ahead = ctx.controller.next_length > 0.0
-        if not points.size:
-            return math.inf if ahead else -math.inf
-        ahead_ = points[points > self.t] if ahead else points[points < self.t][::-1]
-        beyond = (point for point in ahead_.tolist() if not self._is_at(point))
-        stop = next(beyond, math.inf if ahead else -math.inf)
-        ctx.controller.stop, ctx.controller.breaks = stop, int(math.isfinite(stop))
+        """Return the next breakpoint ahead, or infinity, and have no step pass it or the end."""
+        controller, points, end = self._context.controller.numbers, self._breakpoints, self.destination
+        sign = 1.0 if controller.next_length > 0.0 else -1.0
+        infinity = stop = sign * math.inf
+        if points.size:
+            ahead = points[points > self.t] if sign > 0.0 else points[points < self.t][::-1]
+            stop = next((point for point in ahead.tolist() if not self._is_at(point)), infinity)
+        breaks = math.isfinite(stop)
+        if end is None or (end - self.t) * sign <= 0.0 or self._is_at(end):
+            end = infinity
+        if (end - stop) * sign < 0.0:
+            controller.stop, controller.breaks = end, 0
+        else:
+            controller.stop, controller.breaks = stop, int(breaks)
         return stop
 
     def _is_at(self, t: float) -> bool:
@@ -131,8 +141,8 @@ class AdaptiveStepper(HBVMStepper):
         super()._renew(par)
         breakpoints = self._program.breakpoints(par)
         if not np.array_equal(breakpoints, self._breakpoints):
-            self._breakpoints, controller = breakpoints, self._context.controller
-            controller.stop, controller.breaks = math.inf, 0
+            self._breakpoints = breakpoints
+            self._stop()
 
     def _restart(self, t: float) -> None:
         """Begin anew at a breakpoint: what is known from before it says nothing about what follows."""
@@ -178,6 +188,7 @@ class AdaptiveStepper(HBVMStepper):
     def _to(self, times: Array, between: int) -> Samples:
         """Make the samples, piece by piece from one breakpoint to the next."""
         self._watch = stall_detector(self, self.t, float(times[-1]))
+        self._stop()
         if not self._breakpoints.size and not self._context.events.act:
             states, outcome, reason = self._fill(between, times)
             return self._samples(times[: len(states)], states, outcome, reason)
@@ -253,7 +264,9 @@ class AdaptiveStepper(HBVMStepper):
 
     def _scout(self, y: Array) -> "AdaptiveStepper":
         """Return a trajectory from a state now."""
-        return self._program.start(y, self._context.par.copy(), self.t)
+        scout = self._program.start(y, self._context.par.copy(), self.t)
+        scout.destination = self._goal
+        return scout
 
     def _seen(self, scout: "AdaptiveStepper") -> Array:
         """Return times and sizes on a trajectory to the goal: its first steps, and the end."""

@@ -251,8 +251,10 @@ def integrate(
         t, y = [np.array([stepper.t])], [stepper.y[np.newaxis]]  # the last state that was reached
         lows = None if lows is None else [np.zeros_like(y[0])]
 
-    error = stepper.error if status is Status.USER_ERROR and offers(stepper, KeptError) else None
-    if error is not None and stepper.t == problem.t0:  # nothing is reached that could be kept
+    error = stepper.error if failed and offers(stepper, KeptError) else None
+    if (
+        status is Status.USER_ERROR and error is not None and stepper.t == problem.t0
+    ):  # nothing is reached that could be kept
         raise error
     stats = stepper.stats if before is None else both(before, stepper.stats)
     if isinstance(problem.system, Opaque):

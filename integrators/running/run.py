@@ -125,7 +125,14 @@ class Run:
                 last = t + self._way * (abs(last - t) or abs(last - self.problem.t0))
             self._stepper.destination = last
             self._stepper.advance(np.array([t]))
-            self._stepper.destination = None
+        self._bound(t)
+
+    def _bound(self, t: float) -> None:
+        """Have no step from ``t`` pass the end of the problem's interval that lies ahead, if one does."""
+        if offers(self._stepper, Destination):
+            first, last = self.problem.t0, self.problem.t_end
+            end = last if self._way * (last - first) > 0.0 else first
+            self._stepper.destination = end if self._way * (end - t) > 0.0 else None
 
     def _anew(self, y: Array, par: Array, *, turn: bool = False) -> None:
         t, self._par = self.t, par
@@ -340,6 +347,7 @@ class Run:
                     self._turn()
                 else:  # the stepper does so itself
                     self._way *= -1.0
+                    self._bound(self.t)
             samples = self._stepper.advance(np.array([goal]))
             self._shown = (goal, samples.y[0]) if samples.t.size else None
             if self._terminates and self._stepper.status is Status.RUNNING:

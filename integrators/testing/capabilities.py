@@ -94,12 +94,13 @@ def a_destination_leaves_the_samples_alone(method: MethodBase, problem: Problem)
     if not offers(start(method, problem), Destination):
         return "it takes no destination"
     grid = irregular(problem)
-    whole, stepper = start(method, problem).advance(grid), start(method, problem)
-    stepper.destination = float(grid[-1])
+    at_once, stepper = start(method, problem), start(method, problem)
+    at_once.destination = stepper.destination = float(grid[-1])
+    whole = at_once.advance(grid)
     pieces = [stepper.advance(piece) for piece in np.array_split(grid, 3)]
     require(
         np.array_equal(np.concatenate([piece.y for piece in pieces]), whole.y),
-        "a destination does not change the samples",
+        "pieces on the way to a destination do not change the samples",
     )
     return None
 

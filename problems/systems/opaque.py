@@ -1,6 +1,7 @@
 """Opaque systems, whose right-hand side is not traced: a numba function, or any Python function."""
 
 import inspect
+import threading
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any
 
@@ -17,6 +18,16 @@ Array = NDArray[np.float64]
 
 _UNWRITTEN = np.array(0x7FF8_0000_5EED_0001).view(np.float64)  # a NaN that no arithmetic makes
 UNDEFINED = (ArithmeticError, ValueError)  # 1/0, math.sqrt(-1): not a number, as in compiled code
+
+
+class _Undefined(threading.local):
+    """The last field that was not defined somewhere, in this thread, and what it raised there."""
+
+    system: "Opaque | None" = None
+    error: Exception | None = None
+
+
+_last = _Undefined()
 
 
 class Opaque(System):
@@ -121,6 +132,16 @@ class Opaque(System):
             )
         return super().function(name)
 
+    @property
+    def undefined(self) -> Exception | None:
+        """What f raised in this thread where its value is NaN, if it was the last to do so."""
+        return _last.error if _last.system is self else None
+
+    def forget_undefined(self) -> None:
+        """Forget it: a trajectory begins."""
+        if _last.system is self:
+            _last.system = _last.error = None
+
     def evaluate(self, t: float, y: Array, par: Array, out: Array) -> None:
         """Write the derivative at one state to ``out``; NaN if it is not defined.
 
@@ -137,7 +158,8 @@ class Opaque(System):
                 out[:] = _UNWRITTEN
                 arguments += (out,)
             value = self.f(*arguments)
-        except UNDEFINED:
+        except UNDEFINED as error:
+            _last.system, _last.error = self, error.with_traceback(None)  # whose frames hold the arrays
             out[:] = np.nan
             return
         if self.in_place:

@@ -31,8 +31,8 @@ class SciPyProgram(ProgramBase):
         started = perf_counter()
         self.solver = getattr(integrate, self.method.solver)
         self.field = emit.numba(system, "field")
-        # The first call compiles for these types.
-        self.field(0.0, np.ones(system.dim), system.pack({}), np.empty(system.dim))
+        if system.traced:  # the first call compiles for these types; a user's own function may not know t = 0
+            self.field(0.0, np.ones(system.dim), system.pack({}), np.empty(system.dim))
         self.jacobian = system.jacobian() if self.method.implicit else None
         if self.jacobian is not None:
             self.entries = emit.numba(system, self.jacobian)
@@ -89,8 +89,16 @@ class SciPyStepper(StepperBase):
         self._program, self._par = program, par
         self._stats.evaluations = 0
         self._stats.extra["side_evaluations"] = 0
-        with QUIET():
-            self._solver = self._begin(t, y, 1.0)
+        self._made: Any = None
+
+    @property
+    def _solver(self) -> Any:
+        """The solver, which looks from its start to the end of the integration, if that is known by then."""
+        if self._made is None:
+            ahead = self.destination is None or self.destination >= self._t
+            with QUIET():
+                self._made = self._begin(self._t, self._y, 1.0 if ahead else -1.0)
+        return self._made
 
     def _evaluate(self, t: float, y: Array) -> Array:
         # SciPy's own count, nfev, leaves out the evaluations of its finite differences.
@@ -133,7 +141,7 @@ class SciPyStepper(StepperBase):
         )
 
     def _begin(self, t: float, y: Array, sign: float) -> Any:
-        solver = self._make(self._evaluate, t, y, sign * math.inf)
+        solver = self._make(self._evaluate, t, y, self._end(sign))
         if hasattr(
             getattr(solver, "J", None), "tocsc"
         ):  # sparse: what it factors can be neither copied nor kept
@@ -141,6 +149,11 @@ class SciPyStepper(StepperBase):
             solver.lu = lambda matrix: _Factored(matrix, factored(matrix))
         self._note("jacobians", solver.njev)
         return solver
+
+    def _end(self, sign: float) -> float:
+        """Return the end of the integration in a direction; infinitely far where none is known."""
+        end = self.destination
+        return end if end is not None and (end - self._t) * sign > 0.0 else sign * math.inf
 
     def _bound(self, t: float) -> None:
         """Have no step pass ``t``."""
@@ -156,11 +169,10 @@ class SciPyStepper(StepperBase):
         states = np.empty((grid.size, self._y.size))
         watch = stall_detector(self, self._solver.t, float(grid[-1]))
         for i, t in enumerate(grid.tolist()):
-            self._bound(t if how == "stop" else sign * math.inf)
+            self._bound(t if how == "stop" else self._end(sign))
             while sign * (self._solver.t - t) < 0.0:
                 if not self._step(watch):
                     return grid[:i], states[:i]
-            self._solver.status = "running"  # also where it came to its bound
             try:
                 states[i] = self._solver.y if self._solver.t == t else self._aside(t)
             except UserError as raised:
@@ -173,10 +185,10 @@ class SciPyStepper(StepperBase):
     @QUIET()
     def _step_states(self, end: float) -> tuple[Array, Array]:
         sign = self._towards(end)
-        self._bound(sign * math.inf)
+        self._bound(self._end(sign))
         watch = stall_detector(self, self._solver.t, end)
         times, states = [self._t], [self._y]
-        while self._solver.t != times[-1] or self._step(watch):
+        while sign * (times[-1] - end) < 0.0 and (self._solver.t != times[-1] or self._step(watch)):
             if sign * (self._solver.t - end) > 0.0:
                 break
             times.append(float(self._solver.t))
@@ -185,7 +197,7 @@ class SciPyStepper(StepperBase):
 
     @QUIET()
     def _one_step(self) -> tuple[float, Array] | None:
-        self._bound(self._solver.direction * math.inf)
+        self._bound(self._end(self._solver.direction))
         if self._solver.t == self._t and not self._step(StallDetector(self._t, self._t)):
             return None
         return float(self._solver.t), self._solver.y
@@ -194,13 +206,14 @@ class SciPyStepper(StepperBase):
         """Return the sign of the direction to ``end``, with a solver that goes that way."""
         sign = 1.0 if end > self._t else -1.0
         if self._solver.direction != sign:
-            self._solver = self._begin(self._t, self._y, sign)
+            self._made = self._begin(self._t, self._y, sign)
         return sign
 
     def _step(self, watch: "StallDetector") -> bool:
         """Take one step; return whether it succeeded."""
         solver, stats = self._solver, self._stats
         before, jacobians, factored = float(solver.t), solver.njev, solver.nlu
+        solver.status = "running"  # also where it came to its bound
         try:
             message = solver.step()
         except UserError as raised:

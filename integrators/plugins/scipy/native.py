@@ -72,6 +72,8 @@ class NativeSteps:
         else:
             program = self._program_between = _program(field.system, k, s, h)
         self._stepper: Any = program.start(y, field.par, t)
+        if np.isfinite(t_bound):
+            self._stepper.destination = float(t_bound)
         self._between: Between | None = None
         self._started = False
         self._chosen = int(h is None and first_step is None)  # evaluations to choose the first step
