@@ -150,7 +150,7 @@ class HBVMStepper(ABC):
         "discontinuities.doubt_end",
         "discontinuities.boundary", "discontinuities.next_boundary", "previous.t0", "previous.time_low",
         "events.seen", "events.acting",
-        "events.time", "events.length_before", "events.acted", "surfaces.reached", "surfaces.on_surface",
+        "events.time", "events.length_before", "events.acted", "events.repeated", "surfaces.reached", "surfaces.on_surface",
         "surfaces.row", "surfaces.length_wanted", "previous.on_surface", "pace.epsilon", "pace.log_density",
         "pace.previous_log_density", "pace.density_slope", "controller.interval", "controller.no_time_scale",
         "estimate.constant_field", "estimate.rescaled", "estimate.borrowed", "estimate.asks", "energy.start",

@@ -25,8 +25,9 @@ def sides(field: Function, most: int) -> Function | None:
     Function or None
         Its first output is the same everywhere between two switching surfaces. In a loop, sides that change
         in two terms at once and in opposite directions may cancel. Each of the others, ``most`` of them,
-        vanishes on one surface and is smooth beside it; on those of a loop, and on those that are left, one
-        of them vanishes that is of the size of the smallest. ``None`` where the field has no such surface.
+        changes its sign on one surface and is smooth beside it; on those of a loop, and on those that are
+        left, one of them does that is of the size of the smallest. ``None`` where the field has no such
+        surface.
     """
     conditions = [
         node
@@ -42,8 +43,10 @@ def sides(field: Function, most: int) -> Function | None:
     )
     distances = list(dict.fromkeys(_distance(node) for node in conditions))
     if len(distances) > most:
-        last = [_inverse_square(node) for node in distances[most - 1 :]]
-        distances[most - 1 :] = [_smallest(sum(last[1:], last[0]))]
+        last = distances[most - 1 :]
+        squares, counts = [_inverse_square(node) for node in last], [_above(node) for node in last]
+        smallest = _smallest(sum(squares[1:], squares[0]))
+        distances[most - 1 :] = [smallest * _parity(sum(counts[1:], counts[0]))]
     outputs = (terms, *((Term(node, 0),) for node in distances))
     return replace(field, outputs=outputs, loops=(), name="sides")
 
@@ -56,25 +59,41 @@ def _side(node: Node) -> Node:
     elif node.op in WITHOUT_END:
         side = node
     else:
-        side = graph.where(x, graph.const(1.0), graph.const(0.0))
+        side = _above(x)
     return side if node.loop is None else graph.sum(side, node.loop)
 
 
 def _distance(node: Node) -> Node:
-    """Return what vanishes where the node switches."""
+    """Return what vanishes where the node switches, and changes its sign there."""
     graph, x = node.graph, node.args[0]
     if node.op == "table":
         ends = node.data.knots
-        low, high = (
-            graph.table(x, Table(ends, tuple((piece,) for piece in pieces)))
-            for pieces in (ends[:-1], ends[1:])
+        pieces = tuple((float(i),) for i in range(len(ends) - 1))
+        low, high, piece = (
+            graph.table(x, Table(ends, values))
+            for values in (tuple((x,) for x in ends[:-1]), tuple((x,) for x in ends[1:]), pieces)
         )
         x = (x - low) * (high - x)
     elif node.op == "round":
-        x = 0.25 - (x - node) ** 2
+        x, piece = 0.25 - (x - node) ** 2, node
     elif node.op == "floor":
-        x = (x - node) * (1.0 - (x - node))
-    return x if node.loop is None else _smallest(graph.sum(_inverse_square(x), node.loop))
+        x, piece = (x - node) * (1.0 - (x - node)), node
+    else:
+        piece = _above(x)
+        if node.loop is None:
+            return x
+    if node.loop is None:
+        return x * _parity(piece)
+    return _smallest(graph.sum(_inverse_square(x), node.loop)) * _parity(graph.sum(piece, node.loop))
+
+
+def _parity(count: Node) -> Node:
+    """Return 1 for an even number, and -1 for an odd one."""
+    return count.graph.call("cos", np.pi * count)
+
+
+def _above(x: Node) -> Node:
+    return x.graph.where(x, x.graph.const(1.0), x.graph.const(0.0))
 
 
 def _inverse_square(x: Node) -> Node:

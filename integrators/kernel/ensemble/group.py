@@ -137,7 +137,8 @@ class Group(Memory):
     function_values = Array("events", "lanes")  # of each lane, one after another: `Search.ends`,
     function_zeros = Array("events", "lanes")  # `Search.touched`,
     function_finite = Array("events", "lanes", kind=int)  # `Search.finite`,
-    happened = Array("events", "lanes", kind=int)  # and `Search.happened`
+    happened = Array("events", "lanes", kind=int)  # `Search.happened`,
+    recent = Array("events", 3, "lanes")  # and `Search.recent`
     # The start of a step of all lanes, where most lanes have taken it when it is looked at.
     start_t0 = Array("lanes")
     start_time_low = Array("lanes")

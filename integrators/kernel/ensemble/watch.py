@@ -51,6 +51,7 @@ def turn_to(group, lane):
     search.own, search.partial = group.contexts[lane], group.partials[lane]
     search.ends, search.touched = group.function_values + first, group.function_zeros + first
     search.finite, search.happened = group.function_finite + first, group.happened + first
+    search.recent = group.recent + 3 * first
     search.hits = 0
     return search
 

@@ -3,20 +3,21 @@
 An adaptive step is solved anew to the first of them; of a fixed step, the partial step up to there, by which
 the event was found, is all that is taken. Its function is 0 there, and the sign that it has next, which
 rounding hides, is that of its slope along the trajectory from the new state: so the same zero is not found
-again. Where the slope is nothing too, the trajectory stays there.
+again. Where the slope is nothing too, the next derivative tells; see `events.ahead`.
 """
 
-from integrators.kernel.context import ACCUMULATE, ACTS, DONE, HALTED, RENEW, VALUES
+from integrators.kernel.context import ACCUMULATE, ACTS, DONE, HALTED, RENEW
+from integrators.kernel.events.ahead import RESTS, way_ahead
 from integrators.kernel.events.memory import GOING, NOTED, RAISED, TERMINAL, TINY, UNDEFINED
 from integrators.kernel.events.sample import NAN, function, is_finite, noise_of, sign, spread_state
 from integrators.kernel.native.jit import compiled
-from integrators.kernel.simd.memory import call_field, call_line, put, splat8
-from integrators.kernel.step.control import SHORTEST
+from integrators.kernel.simd.memory import call_field, put, splat8
+from integrators.kernel.step.control import is_distinct
 from integrators.kernel.step.sample import read, vectors_of_state
 
 SIMULTANEOUS = 2.0**-49  # times whose relative difference is at most this are the same
 RESIDUE = 4.0  # times the function's value at the zero that was found, its value after may be, and is still 0
-AHEAD = 2.0**-10  # of a step
+MOST_AT_ONCE = 1024  # events that change the state at one time are not without end
 
 
 @compiled
@@ -134,7 +135,7 @@ def has_new_parameters(ctx, search):
 
 @compiled
 def change_state(ctx, search):
-    """Note what happens at the end of the step, and change the state; return DONE, RENEW or HALTED."""
+    """Note what happens at the end of the step, and change the state; DONE, RENEW, ACCUMULATE or HALTED."""
     if ctx.varying == 0:
         put_state(ctx, search.action_state)
     for d in range(search.dim):
@@ -150,6 +151,8 @@ def change_state(ctx, search):
     for event in range(search.count):
         if search.due[event] != 1:
             continue
+        if search.actions[event] and note_time(ctx, search, event):
+            return ACCUMULATE
         i = search.hits
         search.hit_times[i], search.hit_events[i] = search.time, event
         search.hit_directions[i] = search.due_directions[event]
@@ -174,53 +177,36 @@ def change_state(ctx, search):
 
 
 @compiled
-def move_ahead(ctx, search):
-    """Return a small part of the step ahead, with the sign of its direction, to see where a function goes."""
-    return search.sign * (AHEAD * abs(ctx.controller.next_length if ctx.varying else ctx.h))
+def accumulates(search, event):
+    """Whether the present occurrence of an event is one of endlessly many that tend to a time.
 
-
-@compiled
-def set_state_ahead(ctx, search):
-    """Set `Search.end_state` a little ahead of the present state, by its slope alone.
-
-    It is there to see where functions go. Return whether it is finite.
+    The times between them shrink geometrically: this one cannot be told from the one before, and by the ratio
+    of the last two intervals that was to be expected. Two occurrences that happen to be close are none.
     """
-    lanes, rows, values, move = ctx.lanes, ctx.rows, ctx.scratch.sums, move_ahead(ctx, search)
-    for block in range(ctx.calls if ctx.line else 1):
-        for lane in range(lanes):
-            ctx.times[lanes * block + lane] = ctx.t0
-            for d in range(rows):
-                ctx.stages[lanes * (ctx.padded * block + d) + lane] = search.step_state[d]
-    if ctx.line:  # what the field writes is not the slope
-        call_line(ctx.line, VALUES, ctx)
-        values = ctx.values
-    else:
-        call_field(ctx.field, ctx.times, ctx.stages, ctx.par, values)
-    ctx.counters.evaluations += 1
-    finite = True
-    for d in range(rows):
-        slope = values[lanes * d]
-        finite = finite and is_finite(slope)
-        if ctx.second:
-            momentum = search.step_state[rows + d]
-            search.end_state[d] = search.step_state[d] + move * (ctx.factors.velocity[d] * momentum)
-            search.end_state[rows + d] = momentum + move * slope
-        else:
-            search.end_state[d] = search.step_state[d] + move * slope
-    return finite
+    recent = search.recent + 3 * event
+    interval, before = abs(recent[0] - recent[1]), abs(recent[1] - recent[2])
+    if is_distinct(search.time - recent[0], search.time) or not interval < before:
+        return False
+    return not is_distinct(interval * (interval / before), search.time)
 
 
 @compiled
-def is_zero(value, change, move, t):
-    """Whether a function that changes so much in the time ``move`` is 0 at ``t``, as far as times go."""
-    return abs(value * move) < SHORTEST * abs(t) * abs(change)
+def note_time(ctx, search, event):
+    """Note that an event changes the state now; return whether it does so without end."""
+    if is_distinct(search.time - ctx.events.acted, search.time):
+        ctx.events.repeated = 0
+    ctx.events.repeated += 1
+    if accumulates(search, event) or ctx.events.repeated > MOST_AT_ONCE:
+        return True
+    recent = search.recent + 3 * event
+    recent[2], recent[1], recent[0] = recent[1], recent[0], search.time
+    return False
 
 
 @compiled
 def begin_anew(ctx, search):
     """Set what is known of the functions at the new state; ACCUMULATE if the trajectory stays there."""
-    t, state, move = search.time, search.step_state, move_ahead(ctx, search)
-    finite = set_state_ahead(ctx, search)
+    t, state = search.time, search.step_state
     search.known = t
     for event in range(search.count):
         search.event = event
@@ -229,12 +215,12 @@ def begin_anew(ctx, search):
         before = search.values_before[event]
         search.touched[event] = NAN
         if search.due[event]:
-            ahead = function(ctx, search, t + move, search.end_state)
-            if is_zero(value, ahead - value, move, t) or abs(value) <= noise + RESIDUE * abs(before):
-                moves = finite and abs(ahead - value) > noise
-                if search.due[event] == 1 and not moves:
-                    return ACCUMULATE
-                value = TINY * sign(ahead - value) if moves else 0.0
+            arrived = search.due_directions[event] if search.due[event] == 1 else 0
+            at_zero, way = way_ahead(ctx, search, value, noise + RESIDUE * abs(before), noise, arrived)
+            if way == RESTS:
+                return ACCUMULATE
+            if at_zero:
+                value = TINY * way
         elif abs(value) <= noise:
             value = TINY * sign(before if abs(before) > noise else search.ends[event])
         search.ends[event] = value

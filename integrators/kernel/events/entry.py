@@ -5,10 +5,8 @@ from integrators.kernel.events.actions import (
     begin_anew,
     change_state,
     end_step,
-    is_zero,
-    move_ahead,
-    set_state_ahead,
 )
+from integrators.kernel.events.ahead import way_ahead
 from integrators.kernel.events.chebyshev import keep_samples, keeps_away, refine, suspect, transform
 from integrators.kernel.events.memory import (
     FINEST,
@@ -120,7 +118,9 @@ def set_end(ctx, search):
 def begin(ctx, search):
     """Set what is known of the functions at the start: a zero there is no event, unless it is due.
 
-    One that has happened there before is no longer close to zero if the state has been set anew since.
+    It is due where it is said to happen again, and where an event changes the state whose function goes on in
+    its one direction. One that has happened there before is no longer close to zero if the state has been set
+    anew since.
     """
     weigh_first(ctx, search)
     for event in range(search.count):
@@ -128,17 +128,18 @@ def begin(ctx, search):
         value = function(ctx, search, search.time, search.step_state)
         noise = noise_of(ctx, search, search.time, search.step_state)
         search.ends[event] = 0.0 if abs(value) <= noise else value
-        if search.due[event]:
-            set_state_ahead(ctx, search)
-            move = move_ahead(ctx, search)
-            change = function(ctx, search, search.time + move, search.end_state) - value
-            if search.due[event] == 1:
-                search.ends[event] = -TINY * sign(change)
-            elif abs(value) <= noise or is_zero(value, change, move, search.time):
-                search.ends[event] = TINY * sign(change)
+        own = search.actions[event] != 0 and search.directions[event] != 0 and abs(value) <= noise
+        if search.due[event] or own:
+            at_zero, way = way_ahead(ctx, search, value, noise, noise, 0)
+            if search.due[event] == 1 or (search.due[event] == 0 and way == search.directions[event]):
+                search.ends[event] = -TINY * way
+            elif at_zero:
+                search.ends[event] = TINY * way
             search.due[event] = 0
         search.finite[event] = 1 if is_finite(value) else 0
         search.touched[event] = NAN
+        for i in range(3):
+            search.recent[3 * event + i] = NAN
     search.known = search.time
 
 

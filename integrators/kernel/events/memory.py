@@ -49,6 +49,7 @@ class Search(Memory):
     touched = Array("count")  # when each was last seen to be zero
     finite = Array("count", kind=int)  # 1: the function was finite somewhere
     happened = Array("count", kind=int)
+    recent = Array("count", 3)  # when each has changed the state last, before that, and before that
     known = Real()  # the time up to which all is known
     evaluations = Integer()  # of the field, for partial steps
     iterations = Integer()

@@ -32,7 +32,7 @@ from integrators.protocol import Array, Status, UserError
 
 LEAST, MOST = 8, 16  # samples in a step to begin with; more where these do not show the function
 HITS, NUMBERS = 1024, 1 << 17  # occurrences, and components of their states, that are kept until Python asks
-LASTING = ("ends", "touched", "finite", "happened", "due", "due_directions", "action_state")
+LASTING = ("ends", "touched", "finite", "happened", "recent", "due", "due_directions", "action_state")
 
 
 @lru_cache(maxsize=1)

@@ -84,7 +84,7 @@ def zero_between(ctx, search, a, b):
             slope = (value - at_previous) / (x - previous)
         following = x - value / slope if slope != 0.0 else NAN
         if distance < SECANT_DISTANCE and abs(following - x) <= search.resolution / 2.0:
-            break
+            return x if x - a > search.resolution else a
         previous, at_previous = x, value
         x = following
         if i > 2 and i % 3 == 2 and high - low > width / 2.0:

@@ -18,3 +18,4 @@ class Events(Part):
     time = Real()  # when
     length_before = Real()  # of the step before it was ended there
     acted = Real()  # when such an event happened last; infinite: never
+    repeated = Integer()  # how many have happened at that time

@@ -4,7 +4,7 @@ An adaptive step is solved anew to the event. Of a fixed step, the part up to th
 search has solved to find it, and steps of the same size are counted from there.
 """
 
-from integrators.kernel.context import ACCUMULATE, ACTS, ANEW, BY_VALUES, DONE, RENEW, UNSOLVED
+from integrators.kernel.context import ACTS, ANEW, BY_VALUES, DONE, RENEW, UNSOLVED
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.parts.events import BEGIN_ANEW, CHANGE
 from integrators.kernel.simd.memory import call_look
@@ -40,8 +40,6 @@ def end_at_action(ctx):
 def solve_to_action(ctx):
     """Solve the step ahead anew to the event in it that ends it, unless that is at its start; the outcome."""
     events, controller = ctx.events, ctx.controller
-    if not is_distinct(events.time - events.acted, events.time):
-        return ACCUMULATE
     events.length_before = ctx.h if abs(ctx.h) > abs(controller.length_after) else controller.length_after
     part = (events.time - ctx.t0) - ctx.time_low
     if not is_distinct(part, ctx.t0):
@@ -171,8 +169,6 @@ def step_or_act(ctx, t, within):
 def act_within(ctx):
     """Let the event within the fixed step ahead change the state, and go on from there; the outcome."""
     events = ctx.events
-    if not is_distinct(events.time - events.acted, events.time):
-        return ACCUMULATE
     ctx.n, ctx.solved, events.seen = 0, UNSOLVED, 0
     ctx.counters.steps += 1
     outcome = act(ctx)

@@ -3,7 +3,8 @@
 A step whose nodes are not all on one side is tried again with the length at which its distance from the
 surface vanishes, until no node is beyond and the surface is where the step ends: the polynomial of a step
 whose nodes are on one side tells where, a little beyond its end too. The next step begins on the other side.
-Where the field there pushes back to the surface, the trajectory would slide along it, or stick.
+Where the fields on both sides push to the surface, the trajectory would slide along it, or stick; see
+`step.filippov`.
 """
 
 from integrators.kernel.context import DONE
@@ -250,41 +251,26 @@ def spread_state(ctx, t):
 
 @compiled
 def leave(ctx):
-    """Return whether the trajectory leaves the surface that it is on; let the first stages be beyond it.
-
-    It does not where the field pushes back to the surface beyond it. Where a force depends on positions
-    alone, nothing pushes at once.
-    """
+    """Let the first stages of the step ahead be beyond the surface that the trajectory leaves."""
     surfaces, scratch = ctx.surfaces, ctx.scratch
     lanes, rows, values, h = ctx.lanes, ctx.rows, ctx.values, ctx.controller.next_length
     move = NUDGE * h
-    spread_state(ctx, ctx.t0)
-    if ctx.second:
-        for d in range(rows):
-            velocity = ctx.factors.velocity[d] * ctx.state[8 * (d // 4) + d % 4]
-            for lane in range(lanes):
-                scratch.sums[lanes * d + lane] += move * velocity
-    else:
-        if surfaces.on_surface == AT_ORIGIN:
-            call_field(ctx.field, surfaces.times, scratch.sums, ctx.par, values)
-            ctx.counters.evaluations += 1
-        for d in range(rows):
+    spread_state(ctx, ctx.t0 + move)
+    if ctx.second == 0 and surfaces.on_surface == AT_ORIGIN:
+        call_field(ctx.field, surfaces.times, scratch.sums, ctx.par, values)
+        ctx.counters.evaluations += 1
+    for d in range(rows):
+        if ctx.second:
+            slope = ctx.factors.velocity[d] * ctx.state[8 * (d // 4) + d % 4]
+        else:
             slope = values[lanes * d] if surfaces.on_surface == AT_ORIGIN else previous_end(ctx, d)
-            for lane in range(lanes):
-                scratch.sums[lanes * d + lane] += move * slope
+        for lane in range(lanes):
+            scratch.sums[lanes * d + lane] += move * slope
     call_field(ctx.field, surfaces.times, scratch.sums, ctx.par, values)
     ctx.counters.evaluations += 1
-    leaves = True
-    if ctx.second == 0:
-        for d in range(rows):
-            scratch.sums[lanes * d + 1] += move * values[lanes * d]
-        call_field(surfaces.code, surfaces.times, scratch.sums, ctx.par, surfaces.between)
-        between, i = surfaces.between, lanes * surfaces.row
-        leaves = between[1] == between[0] and abs(between[i + 1]) >= abs(between[i])
     for call in range(ctx.calls):
         for d in range(rows):
             value, start = values[lanes * d], lanes * (ctx.padded * call + d)
             for lane in range(lanes):
                 values[start + lane] = value
     ctx.length, ctx.controller.rejected, ctx.blocks.age = h, 1, 0
-    return leaves

@@ -49,6 +49,7 @@ from integrators.kernel.step.estimate import (
     estimate_implicit,
     log_decay,
 )
+from integrators.kernel.step.filippov import slides
 from integrators.kernel.step.finish import count_step, finish
 from integrators.kernel.step.fixed_point import iterate_measured
 from integrators.kernel.step.graze import grazes
@@ -279,13 +280,10 @@ def solve_adaptive(ctx):
     while True:
         # Its first stages are on one side only if they are beyond the surface; what follows from the state
         # alone may be on either.
-        if (
-            ctx.surfaces.on_surface
-            and ctx.length == 0.0
-            and not leave(ctx)
-            and ctx.surfaces.locating + controller.attempts == 0
-        ):
-            return SLIDING
+        if ctx.surfaces.on_surface and ctx.length == 0.0:
+            if ctx.surfaces.locating + controller.attempts == 0 and slides(ctx):
+                return SLIDING
+            leave(ctx)
         h = within(ctx, controller.next_length)
         too_short = not is_distinct(h, ctx.t0)
         if (

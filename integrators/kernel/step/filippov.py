@@ -1,0 +1,201 @@
+"""Whether a trajectory slides along a switching surface that it is on, by Filippov's definition.
+
+With a function g that is 0 on the surface, and the fields on its two sides, it does where both point to the
+surface: where dg/dt along the field is negative on the side on which g is positive, and the other way round
+(A. F. Filippov, "Differential Equations with Discontinuous Righthand Sides", Kluwer 1988, paragraph 4). A
+speed that vanishes at the surface decides nothing; then the next derivative does. A speed vanishes if it
+becomes smaller as the surface is approached.
+"""
+
+from integrators.kernel.native.jit import compiled
+from integrators.kernel.parts.surfaces import AT_STEP_END
+from integrators.kernel.simd.memory import call_field
+from integrators.kernel.step.discontinuities import previous_end
+
+NEAR, FAR = 2.0**-28, 2.0**-20  # of how far states move in a step: distances from the surface
+STAYS = 0.5  # of a speed at the larger distance is left at the smaller one, if it does not vanish
+DIFFERENCE = 2.0**-18  # of the same: for derivatives of g
+SHORT = 2.0**-17  # of a step: for its second derivative
+RESOLVED = 2.0**-12  # of a state's component counts as a move of it
+REACH = 2.0**-4  # of a step: where the field tells how far states move that have no slope yet
+ROUNDING, CANCELLED = 2.0**-50, 2.0**-40  # of the sum of the terms of g, and of its derivative
+NEAR_ABOVE, FAR_ABOVE, NEAR_BELOW, FAR_BELOW = range(4)
+
+
+@compiled
+def slides(ctx):
+    """Whether the trajectory slides along a surface that the present state is on."""
+    surfaces = ctx.surfaces
+    if ctx.line:
+        return False
+    set_moves(ctx)
+    for i in range(1, 1 + surfaces.count):
+        set_lanes(ctx, surfaces.times, ctx.t0, ctx.scratch.sums)
+        call_field(surfaces.code, surfaces.times, ctx.scratch.sums, ctx.par, surfaces.between)
+        g = surfaces.between[ctx.lanes * i]
+        if (g == 0.0 or i == surfaces.row) and slides_along(ctx, i, g):
+            return True
+    return False
+
+
+@compiled
+def component(ctx, d):
+    """Return component d of the state that the field is a function of."""
+    return ctx.state[8 * (d // 4) + 4 + d % 4] if ctx.second else ctx.state[d]
+
+
+@compiled
+def velocity(ctx, d):
+    """Return the rate of that component, in second-order form."""
+    return ctx.factors.velocity[d] * ctx.state[8 * (d // 4) + d % 4]
+
+
+@compiled
+def set_lanes(ctx, times, t, states):
+    """Put a time and the present state to all lanes."""
+    for lane in range(ctx.lanes):
+        times[lane] = t
+        for d in range(ctx.rows):
+            states[ctx.lanes * d + lane] = component(ctx, d)
+
+
+@compiled
+def set_moves(ctx):
+    """Set in `Surfaces.state` how far each component moves in a step, which is what is near a surface."""
+    surfaces, lanes, values, states = ctx.surfaces, ctx.lanes, ctx.values, ctx.scratch.sums
+    moves, h = surfaces.state, abs(ctx.controller.next_length)
+    set_lanes(ctx, surfaces.times, ctx.t0, states)
+    call_field(ctx.field, surfaces.times, states, ctx.par, values)
+    for d in range(ctx.rows):
+        slope = abs(values[lanes * d])
+        if ctx.second:
+            moves[d] = h * (abs(velocity(ctx, d)) + h * abs(ctx.factors.velocity[d]) * slope)
+        else:
+            before = abs(previous_end(ctx, d)) if surfaces.on_surface == AT_STEP_END else 0.0
+            moves[d] = h * max(slope, before)
+        moves[d] += RESOLVED * abs(component(ctx, d))
+    ctx.counters.evaluations += 1
+    if ctx.second:
+        return
+    for d in range(ctx.rows):
+        for lane in range(lanes):
+            states[lanes * d + lane] += REACH * ctx.controller.next_length * values[lanes * d]
+    call_field(ctx.field, surfaces.times, states, ctx.par, values)
+    ctx.counters.evaluations += 1
+    for d in range(ctx.rows):
+        later = h * abs(values[lanes * d])
+        if later > moves[d] and later * 0.0 == 0.0:
+            moves[d] = later
+
+
+@compiled
+def set_gradient(ctx, i, g):
+    """Set the derivatives of function i behind the moves in `Surfaces.state`; return that in time."""
+    surfaces, lanes, rows, states = ctx.surfaces, ctx.lanes, ctx.rows, ctx.scratch.sums
+    moves, gradient = surfaces.state, surfaces.state + ctx.padded
+    for first in range(0, rows, lanes):
+        count = min(lanes, rows - first)
+        set_lanes(ctx, surfaces.times, ctx.t0, states)
+        for lane in range(count):
+            states[lanes * (first + lane) + lane] += DIFFERENCE * moves[first + lane]
+        call_field(surfaces.code, surfaces.times, states, ctx.par, surfaces.between)
+        for lane in range(count):
+            d = first + lane
+            moved = states[lanes * d + lane] - component(ctx, d)
+            gradient[d] = (surfaces.between[lanes * i + lane] - g) / moved if moved != 0.0 else 0.0
+    change = DIFFERENCE * abs(ctx.controller.next_length)
+    set_lanes(ctx, surfaces.times, ctx.t0 + change, states)
+    call_field(surfaces.code, surfaces.times, states, ctx.par, surfaces.between)
+    return (surfaces.between[lanes * i] - g) / (surfaces.times[0] - ctx.t0)
+
+
+@compiled
+def slides_along(ctx, i, g):
+    """Whether on both sides of surface i, whose function is g at the present state, the field points to it."""
+    surfaces, lanes, rows, states, values = ctx.surfaces, ctx.lanes, ctx.rows, ctx.stages, ctx.values
+    moves, gradient, h = surfaces.state, surfaces.state + ctx.padded, ctx.controller.next_length
+    rate = set_gradient(ctx, i, g)
+    square, rounding = 0.0, 0.0
+    for d in range(rows):
+        square += (moves[d] * gradient[d]) ** 2
+        rounding += ROUNDING * abs(gradient[d] * component(ctx, d))
+    if not square > 0.0:
+        return False
+    size = square**0.5
+    set_lanes(ctx, surfaces.times, ctx.t0, states)
+    for d in range(rows):
+        part = moves[d] * (moves[d] * gradient[d] / square)
+        states[lanes * d + NEAR_ABOVE] += (NEAR * size - g) * part
+        states[lanes * d + FAR_ABOVE] += (FAR * size - g) * part
+        states[lanes * d + NEAR_BELOW] += (-NEAR * size - g) * part
+        states[lanes * d + FAR_BELOW] += (-FAR * size - g) * part
+    call_field(ctx.field, surfaces.times, states, ctx.par, values)
+    ctx.counters.evaluations += 4
+    set_curved(ctx, SHORT * h)
+    call_field(surfaces.code, surfaces.times, states, ctx.par, surfaces.ends)
+    for lane in range(lanes):
+        surfaces.times[lane] = ctx.t0 + SHORT * h
+    call_field(surfaces.code, surfaces.times, ctx.scratch.sums, ctx.par, surfaces.between)
+    ahead = 1.0 if h > 0.0 else -1.0
+    above = way(ctx, i, NEAR_ABOVE, rate, rounding) * ahead
+    return above < 0.0 and way(ctx, i, NEAR_BELOW, rate, rounding) * ahead > 0.0
+
+
+@compiled
+def set_curved(ctx, move):
+    """Set states a time later than those of the lanes, to second order."""
+    surfaces, lanes, rows, states, values = ctx.surfaces, ctx.lanes, ctx.rows, ctx.stages, ctx.values
+    after = ctx.scratch.sums
+    for d in range(rows):
+        for lane in range(lanes):
+            j = lanes * d + lane
+            if ctx.second:
+                curved = 0.5 * move * ctx.factors.velocity[d] * values[j]
+                after[j] = states[j] + move * (velocity(ctx, d) + curved)
+            else:
+                after[j] = states[j] + move * values[j]
+    if ctx.second:
+        return
+    slopes = ctx.scratch.old_stages
+    for lane in range(lanes):
+        surfaces.times[lane] = ctx.t0 + move
+    call_field(ctx.field, surfaces.times, after, ctx.par, slopes)
+    ctx.counters.evaluations += 4
+    for d in range(rows):
+        for lane in range(lanes):
+            j = lanes * d + lane
+            after[j] = states[j] + 0.5 * move * (values[j] + slopes[j])
+    for lane in range(lanes):
+        surfaces.times[lane] = ctx.t0
+
+
+@compiled
+def speed(ctx, lane, rate):
+    """Return the derivative of the function along the field of a lane; 0 if that may be rounding."""
+    gradient, total, terms = ctx.surfaces.state + ctx.padded, rate, abs(rate)
+    for d in range(ctx.rows):
+        slope = velocity(ctx, d) if ctx.second else ctx.values[ctx.lanes * d + lane]
+        total += gradient[d] * slope
+        terms += abs(gradient[d] * slope)
+    return total if abs(total) > CANCELLED * terms else 0.0
+
+
+@compiled
+def way(ctx, i, near, rate, rounding):
+    """Return the sign of the first derivative of function i that does not vanish on a side; 0: of none."""
+    at_near, at_far = speed(ctx, near, rate), speed(ctx, near + 1, rate)
+    if remains(at_near, at_far, 0.0):
+        return 1.0 if at_near > 0.0 else -1.0
+    surfaces, at = ctx.surfaces, ctx.lanes * i + near
+    move = SHORT * ctx.controller.next_length
+    at_near = surfaces.between[at] - surfaces.ends[at] - move * at_near
+    at_far = surfaces.between[at + 1] - surfaces.ends[at + 1] - move * at_far
+    if remains(at_near, at_far, rounding):
+        return (1.0 if at_near > 0.0 else -1.0) * (1.0 if move > 0.0 else -1.0)
+    return 0.0
+
+
+@compiled
+def remains(at_near, at_far, rounding):
+    """Whether a derivative that is so large near and far from a surface does not vanish there."""
+    return at_near * at_far > 0.0 and abs(at_near) >= STAYS * abs(at_far) and abs(at_near) > rounding
