@@ -1,6 +1,7 @@
 """On which sides of its switching surfaces a traced field is evaluated, and how far from them."""
 
 from dataclasses import replace
+from math import pi
 
 from problems.analysis.structure import WITHOUT_END, has_kink
 from problems.calculus.function import Function, Term
@@ -89,7 +90,7 @@ def _distance(node: Node) -> Node:
 
 def _parity(count: Node) -> Node:
     """Return 1 for an even number, and -1 for an odd one."""
-    return count.graph.call("cos", np.pi * count)
+    return count.graph.call("cos", pi * count)
 
 
 def _above(x: Node) -> Node:

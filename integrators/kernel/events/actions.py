@@ -12,7 +12,7 @@ from integrators.kernel.events.memory import GOING, NOTED, RAISED, TERMINAL, TIN
 from integrators.kernel.events.sample import NAN, function, is_finite, noise_of, sign, spread_state
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.memory import call_field, put, splat8
-from integrators.kernel.step.control import is_distinct
+from integrators.kernel.step.control import SHORTEST, is_distinct
 from integrators.kernel.step.sample import read, vectors_of_state
 
 SIMULTANEOUS = 2.0**-49  # times whose relative difference is at most this are the same
@@ -177,17 +177,28 @@ def change_state(ctx, search):
 
 
 @compiled
+def follows_itself(search, event):
+    """Whether no other event has changed the state since an event did so last."""
+    for other in range(search.count):
+        if other != event and (search.recent[3 * other] - search.recent[3 * event]) * search.sign >= 0.0:
+            return False
+    return True
+
+
+@compiled
 def accumulates(search, event):
     """Whether the present occurrence of an event is one of endlessly many that tend to a time.
 
-    The times between them shrink geometrically: this one cannot be told from the one before, and by the ratio
-    of the last two intervals that was to be expected. Two occurrences that happen to be close are none.
+    It cannot be told from the one before. If no other event has happened since, the time between the two is
+    shorter than rounding. Else the intervals must shrink geometrically, by the last two of them, to a limit
+    here: in a corner an event may happen twice at a time, between others.
     """
     recent = search.recent + 3 * event
-    interval, before = abs(recent[0] - recent[1]), abs(recent[1] - recent[2])
-    if is_distinct(search.time - recent[0], search.time) or not interval < before:
+    shortest = SHORTEST * abs(search.time)
+    if abs(search.time - recent[0]) > shortest or not is_finite(recent[0]):
         return False
-    return not is_distinct(interval * (interval / before), search.time)
+    interval, before = abs(recent[0] - recent[1]), abs(recent[1] - recent[2])
+    return follows_itself(search, event) or (interval < before and interval * (interval / before) <= shortest)
 
 
 @compiled

@@ -62,6 +62,8 @@ def zero_between(ctx, search, a, b):
     """
     if a == 0.0 and ctx.events.act and ctx.varying == 0 and abs(search.start_value) <= TINY:
         a = leave_start(ctx, search, a, b)
+        if a == 0.0:
+            return a  # it lasts for less time than can be told
     low, high, at_low, at_high = a, b, value_at(ctx, search, a), value_at(ctx, search, b)
     otherwise, width = at_high, b - a
     x, slope = guess(search, a, b)
@@ -84,11 +86,13 @@ def zero_between(ctx, search, a, b):
             slope = (value - at_previous) / (x - previous)
         following = x - value / slope if slope != 0.0 else NAN
         if distance < SECANT_DISTANCE and abs(following - x) <= search.resolution / 2.0:
-            return x if x - a > search.resolution else a
+            break
         previous, at_previous = x, value
         x = following
         if i > 2 and i % 3 == 2 and high - low > width / 2.0:
             x = low + (high - low) / 2.0
+    if abs(at_low) <= TINY:  # a sign without a size
+        return low if high - low <= search.resolution else high
     return low if abs(at_low) < abs(at_high) else high
 
 

@@ -72,11 +72,11 @@ def state_at(ctx, search, t):
 @compiled
 def value_at(ctx, search, x):
     """Return the value of the function at a point, which may be a little beyond the end; NaN: none."""
-    if x == 0.0:
+    t = time_at(search, x)
+    if t == search.start:  # where only the sign may be known
         return search.start_value
     if x == 1.0:
         return search.end_value
-    t = time_at(search, x)
     return function(ctx, search, t, state_at(ctx, search, t))
 
 
