@@ -10,14 +10,14 @@ from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.memory import call_field, call_line
 from integrators.kernel.step.control import SHORTEST
 
-SHORT = 2.0**-10  # of a step, which tells the slope; longer moves, where it does not, are as many times longer
-LONGER, MOVES = 2.0**5, 3
+SHORT = 2.0**-10  # of a step, which tells the slope
+LONGER, MOVES = 2.0**5, 3  # where it does not, so many moves do, each as many times longer
 RESTS = 2  # no sign: the trajectory is pressed to the surface that it has reached, and stays there
 
 
 @compiled
 def add_slope(ctx, search, t, state, base, move, into):
-    """Set ``into`` to ``base`` and ``move`` times the derivative of a state; return whether that is finite."""
+    """Set ``into`` to ``base`` and ``move`` times the derivative of a state; whether that is finite."""
     lanes, rows, values = ctx.lanes, ctx.rows, ctx.scratch.sums
     for block in range(ctx.calls if ctx.line else 1):
         for lane in range(lanes):
@@ -51,7 +51,7 @@ def is_zero(value, change, move, t):
 
 @compiled
 def way_ahead(ctx, search, value, allowed, noise, arrived):
-    """Return whether the function that is looked for is 0 at the present state, and the sign that it has next.
+    """Return whether the function that is looked for is 0 at the state, and the sign that it has next.
 
     Parameters
     ----------
@@ -103,7 +103,8 @@ def way_by_curvature(ctx, search, value, noise, arrived, move):
         if not (finite and is_finite(second)):
             return 0
         if abs(first) > noise or abs(second) > noise:
-            if abs(first) > noise and not (first * second < 0.0 and first * first <= 4.0 * abs(second) * noise):
+            low = first * second < 0.0 and first * first <= 4.0 * abs(second) * noise
+            if abs(first) > noise and not low:
                 return sign(first)
             return RESTS if arrived != 0 and sign(second) == arrived else sign(second)
         move *= LONGER

@@ -76,7 +76,8 @@ def zero_between(ctx, search, a, b):
             x = low + width / 2.0
         value = continued(ctx, search, x, otherwise)
         if value == 0.0:
-            return x
+            high, at_high = x, value
+            break
         if (value > 0.0) == (at_high > 0.0):
             high, at_high = x, value
         else:

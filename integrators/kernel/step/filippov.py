@@ -4,7 +4,8 @@ With a function g that is 0 on the surface, and the fields on its two sides, it 
 surface: where dg/dt along the field is negative on the side on which g is positive, and the other way round
 (A. F. Filippov, "Differential Equations with Discontinuous Righthand Sides", Kluwer 1988, paragraph 4). A
 speed that vanishes at the surface decides nothing; then the next derivative does. A speed vanishes if it
-becomes smaller as the surface is approached.
+becomes smaller as the surface is approached. Where the field beyond does not carry a state away that has
+reached the surface, rounding must not decide which field it has: it is put beyond.
 """
 
 from integrators.kernel.native.jit import compiled
@@ -19,6 +20,7 @@ SHORT = 2.0**-17  # of a step: for its second derivative
 RESOLVED = 2.0**-12  # of a state's component counts as a move of it
 REACH = 2.0**-4  # of a step: where the field tells how far states move that have no slope yet
 ROUNDING, CANCELLED = 2.0**-50, 2.0**-40  # of the sum of the terms of g, and of its derivative
+BEYOND = 2.0  # times that sum a state is put beyond a surface
 NEAR_ABOVE, FAR_ABOVE, NEAR_BELOW, FAR_BELOW = range(4)
 
 
@@ -111,7 +113,7 @@ def set_gradient(ctx, i, g):
 
 @compiled
 def slides_along(ctx, i, g):
-    """Whether on both sides of surface i, whose function is g at the present state, the field points to it."""
+    """Whether on both sides of surface i, whose function is g at the state, the field points to it."""
     surfaces, lanes, rows, states, values = ctx.surfaces, ctx.lanes, ctx.rows, ctx.stages, ctx.values
     moves, gradient, h = surfaces.state, surfaces.state + ctx.padded, ctx.controller.next_length
     rate = set_gradient(ctx, i, g)
@@ -138,7 +140,17 @@ def slides_along(ctx, i, g):
     call_field(surfaces.code, surfaces.times, ctx.scratch.sums, ctx.par, surfaces.between)
     ahead = 1.0 if h > 0.0 else -1.0
     above = way(ctx, i, NEAR_ABOVE, rate, rounding) * ahead
-    return above < 0.0 and way(ctx, i, NEAR_BELOW, rate, rounding) * ahead > 0.0
+    below = way(ctx, i, NEAR_BELOW, rate, rounding) * ahead
+    if ctx.second == 0 and surfaces.on_surface == AT_STEP_END:
+        arrival = rate
+        for d in range(rows):
+            arrival += gradient[d] * previous_end(ctx, d)
+        beyond = 1.0 if arrival * ahead > 0.0 else -1.0
+        if (above if beyond > 0.0 else below) == 0.0:
+            move = beyond * max(BEYOND * rounding, ROUNDING * size) - g
+            for d in range(rows):
+                ctx.state[d] += move * moves[d] * (moves[d] * gradient[d] / square)
+    return above < 0.0 and below > 0.0
 
 
 @compiled

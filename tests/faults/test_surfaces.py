@@ -1,0 +1,82 @@
+"""What trajectories do where they meet a switching surface: cross, slide, stop, or begin to move."""
+
+import numpy as np
+import pytest
+
+from integrators import HBVM, Gauss, Status, integrate
+from problems import Problem, VectorField
+
+from .search.surfaces import END, KINDS, draw
+
+METHODS = [HBVM(), Gauss(s=6, tol=1e-11)]
+
+
+def check_fields(seed, kind, count):
+    rng = np.random.default_rng([seed, KINDS.index(kind)])
+    for i in range(count):
+        drawn = draw(rng, kind)
+        expected = drawn.solve()
+        if expected is None:
+            continue
+        t, y, slides = expected
+        for method in METHODS:
+            found = integrate(drawn.problem, method, [END])
+            assert found.status is (Status.SLIDING if slides else Status.FINISHED), (i, method, found.reason)
+            if slides:
+                assert abs(found.t_stop - t) < 1e-9, (i, method)  # measured 1e-12
+            else:
+                error = np.abs(found.y[-1] - y).max() / max(1.0, np.abs(y).max())
+                assert error < 1e-7, (i, method)  # measured 1e-9
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_affine_fields_slide_where_both_point_to_the_surface_and_nowhere_else(kind):
+    check_fields(2, kind, 10)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_so_do_hundreds_of_fields(kind):
+    check_fields(3, kind, 200)
+
+
+@pytest.mark.parametrize("method", [HBVM(), Gauss(s=4, tol=1e-8)], ids=repr)
+@pytest.mark.parametrize("drag", [0.0, 0.006])
+def test_a_rocket_lifts_off_from_two_surfaces_at_once(method, drag):
+    # Before: sliding at lift-off, with drag: the height, the velocity and the thrust's surplus are 0 there.
+    def f(t, y, m):
+        h, v, mass = y
+        a = (20 * t - drag * v * m.abs(v)) / mass - 9.81
+        return [v, m.where((h <= 0) & (a < 0), 0.0, a), -20 * t / 800]
+
+    found = integrate(Problem(VectorField(f, dim=3), y0=[0.0, 0.0, 1.0], t_end=2.0), method, [2.0])
+    assert found.status is Status.FINISHED
+    expected = [11.86912303, 23.81693471, 0.95] if drag == 0.0 else [11.61731074, 22.81758885, 0.95]
+    assert np.abs(found.y[-1] - expected).max() < 1e-6  # measured 3e-9, the digits given
+
+
+@pytest.mark.parametrize(
+    "method", [HBVM(), HBVM(tol=1e-6), Gauss(s=4, tol=1e-8), HBVM(k=8, s=4, h=0.01)], ids=repr
+)
+def test_a_tank_runs_empty_and_stays_so(method):
+    # Before: sliding, or no convergence: the field vanishes at the surface.
+    tank = VectorField(lambda y, m: [-m.sqrt(m.where(y[0] > 0, y[0], 0.0))], dim=1)
+    found = integrate(Problem(tank, y0=[1.0], t_end=5.0), method, [1.0, 5.0])
+    assert found.status is Status.FINISHED
+    assert abs(found.y[0, 0] - 0.25) < 1e-6  # measured 2e-8 at tol=1e-6
+    assert abs(found.y[1, 0]) < 1e-15
+
+
+@pytest.mark.parametrize("method", METHODS, ids=repr)
+@pytest.mark.parametrize("viscous", [0.0, 0.5])
+def test_a_motor_starts_when_its_torque_exceeds_the_friction(method, viscous):
+    # v' = t - 1 from t = 1 on, less the viscous friction.
+    def f(t, y, m):
+        rests = (y[1] <= 0) & (t < 1.0)
+        return [y[1], m.where(rests, 0.0, t - 1.0 - viscous * y[1])]
+
+    found = integrate(Problem(VectorField(f, dim=2), y0=[0.0, 0.0], t_end=3.0), method, [3.0])
+    assert found.status is Status.FINISHED
+    tau, c = 2.0, viscous
+    v = tau**2 / 2 if c == 0.0 else tau / c - (1.0 - np.exp(-c * tau)) / c**2
+    assert abs(found.y[-1, 1] - v) < 1e-8  # measured 1e-12
