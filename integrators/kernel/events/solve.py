@@ -85,7 +85,8 @@ def zero_between(ctx, search, a, b):
         distance = abs(x - previous)
         if distance > 0.0 and value != at_previous:
             slope = (value - at_previous) / (x - previous)
-        following = x - value / slope if slope != 0.0 else NAN
+        # What is known at the start may be a sign without a size.
+        following = x - value / slope if slope != 0.0 and abs(value) > TINY else NAN
         if distance < SECANT_DISTANCE and abs(following - x) <= search.resolution / 2.0:
             break
         previous, at_previous = x, value
