@@ -60,8 +60,11 @@ WIDE = Numbers(
 
 
 def evaluate(function: Function, t: float, y: NDArray[np.float64], par: NDArray[np.float64]) -> list[Any]:
-    """Return the outputs at one state, numbers of mpmath; nan where one is not defined."""
-    t, y, par = (WIDE.of(np.asarray(values, dtype=np.float64).reshape(-1, 1)) for values in (t, y, par))
+    """Return the outputs at one state, numbers of mpmath; nan where one is not defined.
+
+    The arguments may be numbers of mpmath themselves, whose digits are then used.
+    """
+    t, y, par = (WIDE.of(np.asarray(values, dtype=object).reshape(-1, 1)) for values in (t, y, par))
     return [values[0] for values in Evaluator(WIDE, t, y, par, 1).outputs(function)]
 
 
