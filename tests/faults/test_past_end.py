@@ -1,4 +1,4 @@
-"""Nothing is asked of a field outside the interval, and what it raises is told; all methods, ways, directions."""
+"""Nothing is asked of a field outside the interval, and what it raises is told, by all methods and ways."""
 
 import math
 
