@@ -76,12 +76,13 @@ def drawn(seed: int) -> System:
     )  # fmt: skip
 
 
-def grows(t: float, y: np.ndarray) -> float:
-    """Vanishes where a solution leaves all that could still settle."""
-    return 1e3 - np.abs(y).max()
+class Grows:
+    """Vanishes, for SciPy, where a solution leaves all that could still settle."""
 
+    terminal = True
 
-grows.terminal = True
+    def __call__(self, t: float, y: np.ndarray) -> float:
+        return 1e3 - np.abs(y).max()
 
 
 def settling(first: int, count: int) -> list[System]:
@@ -91,7 +92,7 @@ def settling(first: int, count: int) -> list[System]:
         system = drawn(seed)
         rough = solve_ivp(
             system.numbers, (0.0, END), system.start, method="DOP853", rtol=1e-6, atol=1e-9,
-            events=grows,
+            events=Grows(),
         )  # fmt: skip
         slope = np.abs(system.numbers(END, rough.y[:, -1])).max()
         if rough.status == 0 and slope < 1e-3 * max(1.0, np.abs(rough.y[:, -1]).max()):

