@@ -72,9 +72,9 @@ def read(record: Record, series: Series) -> Record:
 def case_of(record: Record, series: Series) -> Measured | None:
     """Return what is measured on a case, without error growth; ``None`` where it has no trajectory.
 
-    A row of a report has been read, and has only what is drawn of it.
+    A report has of a case only what is drawn: errors and distances, and not what a worker returned.
     """
-    if record.result.outcome not in ("ok", "stalled") or record.result.metrics or "y" not in series:
+    if record.result.outcome not in ("ok", "stalled") or "y" not in series or "distance" in series:
         return None
     problem = make_problem(record.case.problem)
     known = solutions.find(problem)
