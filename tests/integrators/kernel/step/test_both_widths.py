@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from llvmlite import ir
 
-from integrators.kernel.native import binary, field, machine
+from integrators.kernel.native import binary, machine, stages
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.native.memory import aligned
 from integrators.kernel.simd.emit import ALIGNMENT, INTEGER, text_of, vector
@@ -110,7 +110,7 @@ def test_a_rule_gives_the_same_bits_for_a_number_and_for_a_row(rule):
     inputs = 10.0 ** random.uniform(-20, 2, size=(500, ROWS, LANES))
     chosen = random.uniform(size=inputs.shape)
     inputs[chosen < 0.1] = random.choice([0.0, 1.0, 3.0, np.inf, np.nan], size=(chosen < 0.1).sum())
-    alone = results(field.build_one_by_one(rule, LANES), inputs)
+    alone = results(stages.build_one_by_one(rule, LANES), inputs)
     in_lanes = results(binary.build(nothing, [], around=lambda inner: on_rows(rule)), inputs)
     assert np.array_equal(alone, in_lanes, equal_nan=True)
     assert np.isfinite(alone).mean() > 0.5
