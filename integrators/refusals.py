@@ -17,6 +17,12 @@ from problems.quantities import plain_numbers
 Array = NDArray[np.float64]
 
 CHECKED_IN_PYTHON = 32  # numbers that are looked at one by one
+COARSEST = 2.0**-26
+"""Of an interval, the largest distance of the doubles next to its times: half of a double's bits are left.
+
+A time, and so the state at it, is known to about that distance. Julian dates pass from 45 minutes on, seconds
+since 1970 from 16 s on.
+"""
 
 P = ParamSpec("P")
 Result = TypeVar("Result")
@@ -81,6 +87,30 @@ def _out_of_order(grid: Array, t: float) -> str:
         return f"{float(grid[0])!r} is behind it"
     i = int(wrong[0])
     return f"times[{i}] = {float(grid[i])!r} is followed by times[{i + 1}] = {float(grid[i + 1])!r}"
+
+
+def check_interval(t0: float, end: float) -> None:
+    """Refuse an interval so far from 0 that doubles near its times are too coarse for it.
+
+    Steps there would begin and end at other times than are meant, or be shorter than what a time can tell.
+
+    Parameters
+    ----------
+    t0, end : float
+        Where a trajectory starts, and the last time that is asked for.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If the distance of the doubles is more than `COARSEST` of the interval.
+    """
+    latest = max(t0, end, key=abs)
+    apart, length = math.ulp(latest), abs(end - t0)
+    if t0 != 0.0 and 0.0 < COARSEST * length < apart:
+        raise InputError(
+            f"at t = {latest:.6g} doubles are {apart:.3g} apart, too coarse for an interval of {length:.6g}: "
+            "count the time from t0, with t0 = 0."
+        )
 
 
 def check_start(t0: Any) -> float:

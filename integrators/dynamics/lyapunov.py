@@ -22,6 +22,7 @@ from integrators import registry
 from integrators.dynamics.divergence import Divergence
 from integrators.dynamics.vectors import with_variations
 from integrators.protocol import Array, MethodBase, Status
+from integrators.refusals import check_interval
 from problems.checks import at_least, checked_arguments
 from problems.errors import InputError
 from problems.problem import Problem, check_is_problem
@@ -190,6 +191,7 @@ def checked_span(problem: Problem, count: int | None, t_end: float | None, skip:
         raise InputError(f"count={n} is more than the {system.dim} components of {system.name}.")
     if not problem.t0 + skip < end or skip < 0.0:
         raise InputError(f"t_end={end!r} leaves no time after t0={problem.t0!r} and skip={skip!r}.")
+    check_interval(problem.t0, end)
     if np.count_nonzero(interval_ends(problem, end) >= problem.t0 + skip) <= 2 * WAVES:
         raise InputError(f"skip={skip!r} leaves too little of the time for intervals; give a later t_end.")
     return n, end

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from integrators.protocol import Array, MethodBase, Samples, Status, Variations, check_problem, offers
+from integrators.refusals import check_interval
 from integrators.running.integrate import prepared
 from problems.errors import InputError
 from problems.problem import Problem
@@ -156,11 +157,13 @@ def sampling_times(problem: Problem, method: MethodBase, t_end: float | None, sa
     Raises
     ------
     problems.errors.InputError
-        If the end is not after the start, or a step goes beyond it.
+        If the end is not after the start, or a step goes beyond it, or doubles are too coarse for the
+        interval.
     """
     end = problem.t_end if t_end is None else t_end
     if not (np.isfinite(end) and end > problem.t0):
         raise InputError(f"t_end={end!r} must be after t0={problem.t0!r}.")
+    check_interval(problem.t0, end)
     span = end - problem.t0
     regular = np.arange(1, samples + 1) / samples
     count = ceil(np.log(FINENESS / FIRST) * FINENESS)

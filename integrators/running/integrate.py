@@ -33,7 +33,7 @@ from integrators.protocol import (
     offers,
     sampling_named,
 )
-from integrators.refusals import check_times
+from integrators.refusals import check_interval, check_times
 from integrators.running.digits import check_digits, pairs
 from integrators.running.variations import follow
 from integrators.running.watch import SOON, Bar, Report, Watch, both, identity, read
@@ -126,7 +126,8 @@ def integrate(
     ------
     problems.errors.InputError
         If the method does not accept the problem, or for times, samplings, events,
-        initial states and files that cannot be used.
+        initial states and files that cannot be used; also where doubles near the times are further apart
+        than 2**-26 of the interval.
     Exception
         An exception raised by an `problems.Opaque` field in the first step. Later exceptions, and those of an
         event's function, end the integration with the status ``USER_ERROR``; the trajectory up to there is
@@ -155,6 +156,8 @@ def integrate(
 
     program, known = prepared(method, problem.system)
     grid = _grid(problem, times)
+    if grid.size:
+        check_interval(problem.t0, grid.item(-1))
     wanted = wanted_events(events, sample)
     end = float(check_times(grid, problem.t0)[-1]) if grid.size or wanted else problem.t0
     check_tables(problem.system, problem.par, problem.t0, end)

@@ -26,7 +26,7 @@ from integrators.protocol import (
     sampling_named,
 )
 from integrators.reduce import Reducer, Reduction
-from integrators.refusals import check_batch, check_times
+from integrators.refusals import check_batch, check_interval, check_times
 from integrators.running.integrate import SECONDS
 from integrators.running.pieces import (
     Gathered,
@@ -283,6 +283,8 @@ def _times(problem: Problem, times: ArrayLike | None, n: int) -> Array:
     """Return the times of all, (m,), or those of each, (n, m), checked."""
     given = plain_numbers("times", [problem.t_end] if times is None else times)
     if given.ndim != 2:
+        if given.size:
+            check_interval(problem.t0, given.item(-1))
         return check_times(given, problem.t0)
     if len(given) != n:
         raise InputError(f"times of shape {given.shape} are those of {len(given)} trajectories, not of {n}.")
@@ -290,6 +292,7 @@ def _times(problem: Problem, times: ArrayLike | None, n: int) -> Array:
         there = ~np.isnan(row)
         if not there.any() or not there[: int(there.sum())].all():
             raise InputError("a row of times must be numbers, with NaN at its end only.")
+        check_interval(problem.t0, row[there].item(-1))
         check_times(row[there], problem.t0)
     return given
 

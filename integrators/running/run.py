@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from integrators import registry
 from integrators.events.event import Event
 from integrators.protocol import Array, Destination, DoubleDouble, MethodBase, Status, check_problem, offers
-from integrators.refusals import check_parameters, check_state, check_times
+from integrators.refusals import check_interval, check_parameters, check_state, check_times
 from integrators.running.digits import as_pairs, check_digits, pairs
 from integrators.running.integrate import prepared, started, wanted_events
 from integrators.solution import Occurrences, as_mpmath
@@ -50,7 +50,8 @@ def start(
     Raises
     ------
     problems.errors.InputError
-        If the method does not accept the problem, or does not support events.
+        If the method does not accept the problem, or does not support events, or if doubles are too coarse
+        for the problem's interval.
 
     Examples
     --------
@@ -66,6 +67,7 @@ def start(
     if method is None:
         method = registry.create("HBVM")
     check_problem(problem, method)
+    check_interval(problem.t0, problem.t_end)
     return Run(problem, method, events, start)
 
 
