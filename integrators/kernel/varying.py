@@ -71,7 +71,9 @@ class AdaptiveStepper(HBVMStepper):
 
     def _begin_at_breakpoint(self) -> None:
         """Let the step ahead begin with the values beyond a breakpoint, if one is here."""
-        if any(map(self._is_at, self._breakpoints.tolist())):
+        points = self._breakpoints
+        i = int(np.searchsorted(points, self.t))
+        if any(map(self._is_at, points[max(i - 1, 0) : i + 1].tolist())):
             self._context.discontinuities.boundary = START
 
     def _extra(self) -> dict[str, Any]:
@@ -120,8 +122,9 @@ class AdaptiveStepper(HBVMStepper):
         sign = 1.0 if controller.next_length > 0.0 else -1.0
         infinity = stop = sign * math.inf
         if points.size:
-            ahead = points[points > self.t] if sign > 0.0 else points[points < self.t][::-1]
-            stop = next((point for point in ahead.tolist() if not self._is_at(point)), infinity)
+            i = int(np.searchsorted(points, self.t, "right" if sign > 0.0 else "left"))
+            ahead = range(i, points.size) if sign > 0.0 else range(i - 1, -1, -1)
+            stop = next((point for j in ahead if not self._is_at(point := float(points[j]))), infinity)
         breaks = math.isfinite(stop)
         if end is None or (end - self.t) * sign <= 0.0 or self._is_at(end):
             end = infinity
@@ -194,10 +197,12 @@ class AdaptiveStepper(HBVMStepper):
             return self._samples(times[: len(states)], states, outcome, reason)
         out = np.empty((times.size, self._dim))
         count, outcome, reason = 0, ANEW, None
+        sign = math.copysign(1.0, self._context.controller.next_length)
+        ordered = sign * times
         while count < times.size and outcome in (DONE, ANEW) and reason is None:
             stop = self._stop()
-            beyond = np.flatnonzero((times - stop) * self._context.controller.next_length > 0.0)
-            last = int(beyond[0]) if beyond.size and beyond[0] >= count else times.size
+            last = int(np.searchsorted(ordered, sign * stop, "right"))
+            last = last if last >= count else times.size
             piece = times[count:last]
             meets = last < times.size or times[-1] == stop
             grid = np.append(piece, stop) if meets and (not piece.size or piece[-1] != stop) else piece
