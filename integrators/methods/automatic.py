@@ -13,7 +13,8 @@ of two methods' costs are right to a third there. Other processors were not meas
 
 from dataclasses import dataclass
 
-from problems.analysis.structure import degree, depends_on_time
+from problems.analysis.structure import degree
+from problems.analysis.switches import depends_on_time_between_switches
 from problems.calculus.function import Function
 from problems.systems.base import System
 from problems.trace.graph import STATE, T, reachable
@@ -193,8 +194,9 @@ def choose(system: System, tol: float, *, lanes: bool = False) -> tuple[int, int
     The cheapest of the methods with 8 and with 16 nodes, by `Work.per_time`; but HBVM(16, 14), or in lanes
     HBVM(8, 7), where no other is much cheaper. In lanes HBVM(12, 11) takes its place where the energy is
     a polynomial whose forces are not linear. A field that depends on the time, or is code, has sixteen
-    nodes, which see shorter pulses. A polynomial energy of degree nu is conserved exactly by
-    k >= nu s/2 nodes and needs no bound on the quadrature's error.
+    nodes, which see shorter pulses; not where the time only switches it at times that are known. A
+    polynomial energy of degree nu is conserved exactly by k >= nu s/2 nodes and needs no bound on the
+    quadrature's error.
 
     Parameters
     ----------
@@ -221,7 +223,7 @@ def choose(system: System, tol: float, *, lanes: bool = False) -> tuple[int, int
         return None if exact else QUADRATURE_ERRORS[k]
 
     # What a field does between its nodes is not seen; only in time, or where it is code, is it likely.
-    seen = system.traced and not depends_on_time(system)
+    seen = system.traced and not depends_on_time_between_switches(system)
     usual = (NARROW, NARROW - 1) if lanes and seen else (WIDE, WIDE - SPARE)
     methods = [(WIDE, s) for s in range(2, WIDE - SPARE + 1)]
     if seen:

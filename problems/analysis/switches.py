@@ -75,6 +75,27 @@ class Switches:
         return np.unique(times[np.isfinite(times)]) + 0.0  # no negative zero
 
 
+def depends_on_time_between_switches(system: System) -> bool:
+    """Whether the field depends on the time other than by conditions whose switching times are solved for.
+
+    If it does not, as with ``m.where(t > 5, 0, 2)``, it is autonomous from one of those times to the next.
+    """
+    unknown = np.full(system.n_par, np.nan)
+    pending, seen = list((system.energy or system.function("field")).roots), set[int]()
+    while pending:
+        node = pending.pop()
+        if node.id in seen or not node.flags & T:
+            continue
+        seen.add(node.id)
+        if node.op == "symbol":
+            return True
+        args = node.args
+        if node.op in ("where", "sign") and args[0].flags & (T | STATE) == T:
+            args = args[1:] if affine_pieces(args[0], unknown) is not None else args
+        pending += args
+    return False
+
+
 def affine_pieces(node: Node, par: NDArray[np.float64]) -> Pieces | None:
     """Return a node's affine pieces as a function of time; ``None`` where it is not made of a few."""
     return _Evaluation(par).of(node)
