@@ -23,10 +23,10 @@ def check_fields(seed, kind, count):
             found = integrate(drawn.problem, method, [END])
             assert found.status is (Status.SLIDING if slides else Status.FINISHED), (i, method, found.reason)
             if slides:
-                assert abs(found.t_stop - t) < 1e-9, (i, method)  # measured 1e-12
+                assert abs(found.t_stop - t) < 1e-9, (i, method)  # measured 3e-15
             else:
                 error = np.abs(found.y[-1] - y).max() / max(1.0, np.abs(y).max())
-                assert error < 1e-7, (i, method)  # measured 1e-9
+                assert error < 1e-7, (i, method)  # measured 1.4e-12
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -52,7 +52,7 @@ def test_a_rocket_lifts_off_from_two_surfaces_at_once(method, drag):
     found = integrate(Problem(VectorField(f, dim=3), y0=[0.0, 0.0, 1.0], t_end=2.0), method, [2.0])
     assert found.status is Status.FINISHED
     expected = [11.86912303, 23.81693471, 0.95] if drag == 0.0 else [11.61731074, 22.81758885, 0.95]
-    assert np.abs(found.y[-1] - expected).max() < 1e-6  # measured 3e-9, the digits given
+    assert np.abs(found.y[-1] - expected).max() < 1e-6  # measured 5e-9, the digits given
 
 
 @pytest.mark.parametrize(
@@ -63,7 +63,7 @@ def test_a_tank_runs_empty_and_stays_so(method):
     tank = VectorField(lambda y, m: [-m.sqrt(m.where(y[0] > 0, y[0], 0.0))], dim=1)
     found = integrate(Problem(tank, y0=[1.0], t_end=5.0), method, [1.0, 5.0])
     assert found.status is Status.FINISHED
-    assert abs(found.y[0, 0] - 0.25) < 1e-6  # measured 2e-8 at tol=1e-6
+    assert abs(found.y[0, 0] - 0.25) < 1e-6  # measured 0, also at tol=1e-6
     assert abs(found.y[1, 0]) < 1e-15
 
 
@@ -79,4 +79,4 @@ def test_a_motor_starts_when_its_torque_exceeds_the_friction(method, viscous):
     assert found.status is Status.FINISHED
     tau, c = 2.0, viscous
     v = tau**2 / 2 if c == 0.0 else tau / c - (1.0 - np.exp(-c * tau)) / c**2
-    assert abs(found.y[-1, 1] - v) < 1e-8  # measured 1e-12
+    assert abs(found.y[-1, 1] - v) < 1e-8  # measured 0
