@@ -10,6 +10,13 @@ from problems.errors import InputError, shown
 _PLAIN = {float, int, np.float64}
 
 
+class PlainArray(np.ndarray):
+    """Base of arrays that are written to in another way, and carry nothing but numbers."""
+
+
+_ALLOWED = (np.memmap, PlainArray)
+
+
 def plain_numbers(label: str, value: ArrayLike) -> NDArray[np.float64]:
     """Return numbers as an array of float64; an array of float64 as it is.
 
@@ -49,7 +56,11 @@ def _more(value: Any) -> str | None:
         )
     if isinstance(value, np.ma.MaskedArray):
         return "is a masked array; give plain numbers, as from .compressed() or .filled(value)"
-    if isinstance(value, np.ndarray) and kind not in (np.ndarray, np.memmap):
+    if (
+        isinstance(value, np.ndarray)
+        and kind is not np.ndarray
+        and not isinstance(value, np.memmap | PlainArray)
+    ):
         return f"is a {kind.__name__}, of which only the numbers would be used; give np.asarray of it"
     if isinstance(value, complex | np.complexfloating) or _kind(value) == "c":
         return (

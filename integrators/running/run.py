@@ -18,6 +18,7 @@ from problems.analysis import invariants
 from problems.checks import checked_arguments
 from problems.errors import InputError
 from problems.problem import Problem
+from problems.quantities import PlainArray
 
 CLOSE = 64  # units in the last place: nothing happens in a time as short
 
@@ -388,7 +389,7 @@ def _rounding(t: float) -> float:
     return CLOSE * float(np.spacing(abs(t)))
 
 
-class _Whole(np.ndarray):
+class _Whole(PlainArray):
     """A copy of what can be set as a whole only: what was written into it would change nothing."""
 
     setting = ""

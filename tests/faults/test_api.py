@@ -41,7 +41,7 @@ HBVM(k=4, s=2, h=huge)                                       | h=about 1e400 of 
 HBVM(k=4, s=2, h=[.1])                                       | h=[0.1] of HBVM must be a finite step above 0;
 HBVM(k=4, s=2, h=np.array([.1, .2]))                         | h=array([0.1, 0.2]) of HBVM must be a finite s
 HBVM(k=4, s=2, h=np.array([.1]))                             | h=array([0.1]) of HBVM must be a finite step a
-HBVM(k=4, s=2, h=1j)                                         | h=1j of HBVM must be a finite step above 0; th
+HBVM(k=4, s=2, h=1j)                                         | h=1j of HBVM is complex, and must be real
 HBVM(k=4, h=.1)                                              | HBVM needs s with k=4; give s too
 HBVM(h=.1)                                                   | HBVM needs k and s with a fixed step, h=0.1;
 HBVM(tol=0)                                                  | tol=0 of HBVM must be a tolerance from 2.2e-16
@@ -191,7 +191,7 @@ integrate(P1, M1, times=[1, 0])                              | times must be str
 integrate(P1, M1, times=[0, 1, .5])                          | times must be strictly monotone and ahead of
 integrate(P1, M1, times=[[0, 1]])                            | times must be a non-empty one-dimensional
 integrate(P1, M1, times=[[0], [1, 2]])                       | times must be numbers, not [[0], [1, 2]]
-integrate(P1, M1, times=[0, 1j])                             | times must be numbers, not [0, 1j]
+integrate(P1, M1, times=[0, 1j])                             | times is complex, and must be real
 integrate(P1, M1, times=['a', 'b'])                          | times must be numbers, not ['a', 'b']
 integrate(P1, M1, times=huge)                                | times must be numbers, not about 1e400
 integrate(P1, M1, times=[0, huge])                           | times must be numbers, not [0,
@@ -236,9 +236,9 @@ section(P1, M1, osc, t_end=[1, 2])                           | t_end=[1, 2] of a
 section(P1, M1, osc, t_end=huge)                             | t_end=about 1e400 of a section must be a finite
 section(P1, 'HBVM', osc)                                     | method must be a method such as HBVM(k=8,
 integrate(F(lambda t, y: [1]), M1)                           | system returns an array of shape (1,), not
-integrate(F(lambda t, y: 'ab'), M1)                          | system returns 'ab', not 2 numbers
+integrate(F(lambda t, y: 'ab'), M1)                          | what system returns must be numbers, not 'ab'
 integrate(F(lambda t, y: None), M1)                          | system returns an array of shape (), not
-integrate(F(lambda t, y: {}), M1)                            | system returns {}, not 2 numbers
+integrate(F(lambda t, y: {}), M1)                            | what system returns must be numbers, not {}
 integrate(F(lambda t, y: [huge, 1]), M1)                     | system returns
 integrators.order_of(3)                                      | 3 is no Runge-Kutta method whose coefficients
 integrators.stability(3, 1)                                  | 3 is no Runge-Kutta method whose coefficients
