@@ -10,6 +10,7 @@ import numpy as np
 from integrators.events.finder import Ending
 from integrators.protocol import (
     Array,
+    Destination,
     Interruptible,
     Samples,
     Status,
@@ -87,6 +88,8 @@ def _single(
         return Trajectories(times, y, [Status.USER_ERROR], [reason], np.array([t0]), steps), {}
     if offers(stepper, Interruptible):
         stepper.stop = stop
+    if offers(stepper, Destination):
+        stepper.destination = end
     samples = stepper.advance(times)
     ending = ending_of(stepper, samples, t0, end)
     n = ending.count(samples.t, stepper.search)

@@ -195,21 +195,16 @@ def test_what_a_function_raises_inside_a_step_that_ends_at_a_zero_is_not_lost():
     assert "a hole" in made.reason
 
 
-@pytest.mark.parametrize(
-    ("sample", "status", "reason"),
-    [
-        ("dense", Status.STALLED, "the partial step from t = 9.5 to t = 9.8 cannot be solved."),
-        ("steps", Status.NOT_FINITE, "the vector field is not finite in the step from t = 9.5."),
-    ],
-)
-def test_a_last_part_of_a_step_that_cannot_be_solved_is_no_silence(sample, status, reason):
-    def field(t, y):  # not a number where only the partial step asks for it
+@pytest.mark.parametrize("sample", ["dense", "steps"])
+def test_a_last_part_of_a_step_that_cannot_be_solved_is_no_silence(sample):
+    def field(t, y):  # not a number where only the last, shorter step asks for it
         return [y[1], math.nan if 9.73 < t < 9.74 else -y[0]]
 
     problem = Problem(Opaque(field, dim=2), y0=[0.0, 1.0], t_end=9.8)
     made = integrate(problem, Gauss(s=2, h=0.5), [9.8], sample, events=Event(lambda y: y[0], name="y"))
-    assert made.status is status
-    assert made.reason == f"{reason} Events are known up to t = 9.5 only."
+    assert made.status is Status.NOT_FINITE
+    assert made.reason.startswith("the vector field is not finite in the step from t = 9.5.")
+    assert made.t_stop == 9.5  # events are known up to there
     assert len(made.events["y"]) == 3
 
 
