@@ -10,7 +10,7 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from integrators.caveats import undetected
 from integrators.events.event import Event
@@ -411,7 +411,7 @@ class TaylorStepper(RestorableStepper):
     def _broken(self, t: float, y: Array) -> None:
         reason = f"heyoka met a state that is not finite in the step from t = {t!r}"
         tc = np.asarray(self._ta.tc)
-        infinite = ~np.isfinite(tc).all(axis=0)
+        infinite: NDArray[np.bool_] = ~np.all(np.isfinite(tc), axis=0)
         if infinite.any() and not infinite[:2].any():  # the state and the field are finite
             order, most = int(infinite.argmax()), tc.shape[1] - 1
             reason += (
