@@ -96,4 +96,5 @@ def export(
 ) -> None:
     """Write a run as a flat table, for a spreadsheet or a data frame."""
     ensure_writable(out.parent)
+    exporting.ensure_known(out, table)  # before the run is opened
     print(f"{exporting.export(opened([directory]), out, table)} rows in {out}")

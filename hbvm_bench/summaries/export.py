@@ -39,10 +39,7 @@ def export(stores: Sequence[Store], path: Path, table: str = "cases") -> int:
         For another ending or table, a directory without a run, the series of a report, or a missing
         library.
     """
-    if table not in TABLES:
-        raise unknown("table", table, TABLES)
-    if path.suffix not in FORMATS:
-        raise InputError(f"{str(path)!r} must end in {' or '.join(FORMATS)}.")
+    ensure_known(path, table)
     chosen, stored, count = TABLES[table], [(store, reading.records(store)) for store in stores], 0
     writer = _csv if path.suffix == ".csv" else _parquet
     with atomic(path) as temporary, writer(temporary, chosen.columns) as write:
@@ -54,6 +51,20 @@ def export(stores: Sequence[Store], path: Path, table: str = "cases") -> int:
         if table == "series" and not count:
             raise InputError(f"{str(stores[0].directory)!r} is a report, which has no series; export a run.")
     return count
+
+
+def ensure_known(path: Path, table: str) -> None:
+    """Refuse a table or the ending of a file that `export` does not know.
+
+    Raises
+    ------
+    problems.errors.InputError
+        With those that it knows.
+    """
+    if table not in TABLES:
+        raise unknown("table", table, TABLES)
+    if path.suffix not in FORMATS:
+        raise InputError(f"{str(path)!r} must end in {' or '.join(FORMATS)}.")
 
 
 def as_json(records: Sequence[Record]) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from integrators.kernel import tables
 from integrators.kernel.along import batch_along
 from integrators.kernel.batch import Batch, prepare_batch
 from integrators.kernel.batch_events import WithEvents
+from integrators.kernel.breakpoints import Breakpoints
 from integrators.kernel.context import Context, Shape, blocks, width_of_blocks
 from integrators.kernel.engines import look, solver, steps
 from integrators.kernel.ensemble.prepared import Lanes, compiled_lanes, lanes_of
@@ -617,11 +618,9 @@ class AdaptiveProgram(HBVMProgram):
         controller.longest_constant = min(most, part)
         controller.longest = controller.longest_constant if self._timed else most
 
-    def breakpoints(self, par: Array) -> Array:
-        """Return the times that steps end at, ascending: those given, and those of the formulas."""
-        if not self._switches.any:
-            return self._given
-        return np.union1d(self._given, self._switches.times(par))
+    def breakpoints(self, par: Array) -> Breakpoints:
+        """Return the times that steps end at: those given, and those of the formulas."""
+        return Breakpoints(self._given, self._switches, par)
 
     @property
     def description(self) -> str:

@@ -6,6 +6,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from integrators.kernel.breakpoints import Breakpoints
 from integrators.kernel.context import (
     ANEW,
     BUDGET,
@@ -42,7 +43,7 @@ class VaryingProgram(Program, Protocol):
     max_step: float | None
     max_steps: int | None
 
-    def breakpoints(self, par: Array) -> Array: ...
+    def breakpoints(self, par: Array) -> Breakpoints: ...
     def limit(self, context: Context, interval: float) -> None: ...
     def start(self, y0: Array, par: Array | None = None, t0: float = 0.0) -> "AdaptiveStepper": ...
 
@@ -65,15 +66,12 @@ class AdaptiveStepper(HBVMStepper):
         self._max_steps = program.max_steps
         self._origin = self._goal = t0
         self._in_vain = 1
+        self._begins = self._breakpoints.any
         super().__init__(program, y, par, t0)
-        if self._breakpoints.size:
-            self._begin_at_breakpoint()
 
     def _begin_at_breakpoint(self) -> None:
         """Let the step ahead begin with the values beyond a breakpoint, if one is here."""
-        points = self._breakpoints
-        i = int(np.searchsorted(points, self.t))
-        if any(map(self._is_at, points[max(i - 1, 0) : i + 1].tolist())):
+        if any(map(self._is_at, self._breakpoints.around(self.t, self._expected_way()))):
             self._context.discontinuities.boundary = START
 
     def _extra(self) -> dict[str, Any]:
@@ -87,7 +85,7 @@ class AdaptiveStepper(HBVMStepper):
     def _one_step(self) -> bool:
         stop = self._context.controller.numbers.stop
         if (
-            self._breakpoints.size
+            self._breakpoints.any
             or self._max_steps is not None
             or (math.isfinite(stop) and self._is_at(stop))
         ):
@@ -121,18 +119,25 @@ class AdaptiveStepper(HBVMStepper):
         controller, points, end = self._context.controller.numbers, self._breakpoints, self.destination
         sign = 1.0 if controller.next_length > 0.0 else -1.0
         infinity = stop = sign * math.inf
-        if points.size:
-            i = int(np.searchsorted(points, self.t, "right" if sign > 0.0 else "left"))
-            ahead = range(i, points.size) if sign > 0.0 else range(i - 1, -1, -1)
-            stop = next((point for j in ahead if not self._is_at(point := float(points[j]))), infinity)
-        breaks = math.isfinite(stop)
         if end is None or (end - self.t) * sign <= 0.0 or self._is_at(end):
             end = infinity
+        if self._begins:  # how far it is to go is known now, and with it where to look
+            self._begins = False
+            self._begin_at_breakpoint()
+        if points.any:
+            ahead = points.ahead(self.t, end, self._expected_way())
+            stop = next((point for point in ahead if not self._is_at(point)), infinity)
+        breaks = math.isfinite(stop)
         if (end - stop) * sign < 0.0:
             controller.stop, controller.breaks = end, 0
         else:
             controller.stop, controller.breaks = stop, int(breaks)
         return stop
+
+    def _expected_way(self) -> float:
+        """Return how far the trajectory is to go, as far as that is known."""
+        ahead = math.copysign(1.0, self._context.controller.next_length)
+        return ahead * max(ahead * (self._goal - self.t), abs(self._context.controller.next_length)) or ahead
 
     def _is_at(self, t: float) -> bool:
         """Whether a breakpoint is reached; as `integrators.kernel.step.vary.remaining`."""
@@ -142,9 +147,8 @@ class AdaptiveStepper(HBVMStepper):
 
     def _renew(self, par: Array) -> None:
         super()._renew(par)
-        breakpoints = self._program.breakpoints(par)
-        if not np.array_equal(breakpoints, self._breakpoints):
-            self._breakpoints = breakpoints
+        if self._breakpoints.moved_by(par):
+            self._breakpoints = self._program.breakpoints(par)
             self._stop()
 
     def _restart(self, t: float) -> None:
@@ -192,17 +196,15 @@ class AdaptiveStepper(HBVMStepper):
         """Make the samples, piece by piece from one breakpoint to the next."""
         self._watch = stall_detector(self, self.t, float(times[-1]))
         self._stop()
-        if not self._breakpoints.size and not self._context.events.act:
+        if not self._breakpoints.any and not self._context.events.act:
             states, outcome, reason = self._fill(between, times)
             return self._samples(times[: len(states)], states, outcome, reason)
         out = np.empty((times.size, self._dim))
         count, outcome, reason = 0, ANEW, None
-        sign = math.copysign(1.0, self._context.controller.next_length)
-        ordered = sign * times
         while count < times.size and outcome in (DONE, ANEW) and reason is None:
             stop = self._stop()
-            last = int(np.searchsorted(ordered, sign * stop, "right"))
-            last = last if last >= count else times.size
+            beyond = np.flatnonzero((times - stop) * self._context.controller.next_length > 0.0)
+            last = int(beyond[0]) if beyond.size and beyond[0] >= count else times.size
             piece = times[count:last]
             meets = last < times.size or times[-1] == stop
             grid = np.append(piece, stop) if meets and (not piece.size or piece[-1] != stop) else piece

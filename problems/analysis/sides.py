@@ -5,7 +5,7 @@ from math import pi
 
 from problems.analysis.structure import WITHOUT_END, has_kink
 from problems.calculus.function import Function, Term
-from problems.trace.graph import STATE, Node, T, Table, reachable
+from problems.trace.graph import STATE, Node, Table, reachable
 
 GOLDEN = (5.0**0.5 - 1.0) / 2.0  # multiples of it are far from equal sums
 
@@ -16,8 +16,7 @@ def sides(field: Function, most: int) -> Function | None:
     Parameters
     ----------
     field : Function
-        Of a system; conditions in time alone do not count, see `problems.analysis.switches`, except those
-        of a rounded number, which have no end.
+        Of a system; conditions in time alone do not count, see `problems.analysis.switches`.
     most : int
         Surfaces whose distances have an output of their own.
 
@@ -33,8 +32,7 @@ def sides(field: Function, most: int) -> Function | None:
     conditions = [
         node
         for node in reachable(field.roots)
-        if (has_kink(node) or node.op == "table")
-        and node.args[0].flags & (STATE | T if node.op in WITHOUT_END else STATE)
+        if (has_kink(node) or node.op == "table") and node.args[0].flags & STATE
     ]
     if not conditions:
         return None

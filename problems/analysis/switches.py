@@ -3,11 +3,13 @@
 from collections.abc import Sequence
 from functools import cached_property
 from itertools import product
+from math import pi
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from problems.analysis.isolation import MOST, TimeFunction, TooMany
 from problems.analysis.structure import WITHOUT_END, has_kink
 from problems.evaluate.doubles import DOUBLES
 from problems.systems.base import System
@@ -20,15 +22,17 @@ Pieces = list[tuple[Any, Any]]
 Numbers, or arrays of one number per term inside a declared sum.
 """
 
+SHORTER, SHORTENED = 2.0**-6, 4  # an interval with too many switches, and how often
 MOST_PIECES = 16  # of a node: nested choices beyond that are not solved for
 
 
 class Switches:
     """The times at which conditions, absolute values and tables of a traced field switch.
 
-    Solved for are those of anything affine in time, with parameters at will: ``m.where(t > par.c, ...)``,
-    ``m.abs(2*t - par.c)``, ``m.table(t/par.T, xs, ys)``; also where absolute values and choices
-    of such terms are compared, as in ``m.where(m.abs(t - 3) < par.w, ...)``.
+    Those of anything affine in time, with parameters at will, are solved for: ``m.where(t > par.c, ...)``,
+    ``m.abs(2*t - par.c)``, ``m.table(t/par.T, xs, ys)``; also where absolute values and choices of such
+    terms are compared, as in ``m.where(m.abs(t - 3) < par.w, ...)``. Those of other functions of the time,
+    as ``m.where(m.cos(w*t) > par.c, ...)``, are isolated, see `problems.analysis.isolation`.
 
     Parameters
     ----------
@@ -41,38 +45,138 @@ class Switches:
         self._nodes = [
             node
             for node in nodes
-            if (has_kink(node) or node.op == "table")
-            and node.args[0].flags & (T | STATE) == T
-            and node.op not in WITHOUT_END  # see `problems.analysis.sides`
+            if (has_kink(node) or node.op == "table") and node.args[0].flags & (T | STATE) == T
         ]
+        self._functions: dict[tuple[int, int], TimeFunction] = {}
 
     @cached_property
     def _fixed(self) -> NDArray[np.float64] | None:
-        """The times, where no parameter moves them."""
+        """The times, where they are a few that no parameter moves."""
         if any(node.args[0].flags & PAR for node in self._nodes):
             return None
-        return self._solved(np.empty(0))
+        return self._few(np.empty(0))
 
     @property
     def any(self) -> bool:
         """Whether there may be such times."""
         return bool(self._nodes)
 
-    def times(self, par: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the finite times at which the field switches with these parameters, ascending."""
-        return self._solved(par) if self._fixed is None else self._fixed
+    def times(
+        self, par: NDArray[np.float64], near: float, far: float
+    ) -> tuple[NDArray[np.float64], float, float]:
+        """Return the times at which the field switches with these parameters, ascending.
 
-    def _solved(self, par: NDArray[np.float64]) -> NDArray[np.float64]:
+        Parameters
+        ----------
+        par : ndarray, shape (n_par,)
+            Parameters.
+        near, far : float
+            The interval that is asked for; either may be the larger.
+
+        Returns
+        -------
+        times : ndarray, shape (n,)
+            Finite, and at least those of the interval.
+        near, far : float
+            Where they are all known: less than asked for where there are too many, everywhere where they
+            are a few.
+        """
+        few = self._few(par) if self._fixed is None else self._fixed
+        if few is not None:
+            sign = np.copysign(1.0, far - near)
+            return few, -sign * np.inf, sign * np.inf
+        reach = far - near
+        for _ in range(SHORTENED):
+            try:
+                return self._isolated(par, near, near + reach, exhaust=False), near, near + reach
+            except TooMany:
+                reach *= SHORTER
+        return self._isolated(par, near, far, exhaust=True), near, far
+
+    def moved(self, before: NDArray[np.float64], after: NDArray[np.float64]) -> bool:
+        """Whether the times differ with other parameters, or may."""
+        if self._fixed is not None or np.array_equal(before, after):
+            return False
+        old, new = self._few(before), self._few(after)
+        if old is None or new is None:
+            return any(node.args[0].flags & PAR for node in self._nodes)
+        return not np.array_equal(old, new)
+
+    def _few(self, par: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """Return all of the times where they are known as a list."""
         pieces = _Evaluation(par).of
         crossings = [np.empty(0)]
         for node in self._nodes:
-            levels = np.array(node.data.knots if node.op == "table" else [0.0])
-            for slope, offset in pieces(node.args[0]) or ():
-                slope, offset = np.broadcast_arrays(np.atleast_1d(slope), offset)
-                with np.errstate(all="ignore"):
-                    crossings.append(((levels[:, None] - offset) / slope).ravel())
-        times = np.concatenate(crossings)
-        return np.unique(times[np.isfinite(times)]) + 0.0  # no negative zero
+            found = None if node.op in WITHOUT_END else pieces(node.args[0])
+            if found is None:
+                return None
+            crossings.append(_crossings(found, _levels(node)))
+        return _sorted(crossings)
+
+    def _isolated(
+        self, par: NDArray[np.float64], near: float, far: float, *, exhaust: bool
+    ) -> NDArray[np.float64]:
+        """Return the times in an interval."""
+        low, high = min(near, far), max(near, far)
+        pieces = _Evaluation(par).of
+        known = np.array([low, high])
+        for node in self._nodes:  # what is chosen inside a condition comes before it
+            affine = pieces(node.args[0])
+            if affine is None:
+                found = [
+                    self._function(node, i).zeros(par, known, exhaust=exhaust)
+                    for i in range(len(node.data.knots) if node.op == "table" else 1)
+                ]
+            elif node.op in WITHOUT_END:
+                found = [_repeated(piece, low, high, 0.5 * (node.op == "round")) for piece in affine]
+            else:
+                found = [_crossings(affine, _levels(node))]
+            times = _sorted(found)
+            known = np.union1d(known, times[(times > low) & (times < high)])
+        return known[1:-1]
+
+    def _function(self, node: Node, i: int) -> TimeFunction:
+        """Return a function that changes its sign where a node switches: at its knot i, if it has some."""
+        place = (node.id, i)
+        if place not in self._functions:
+            x = node.args[0]
+            if node.op in WITHOUT_END:
+                x = x.graph.call("cos" if node.op == "round" else "sin", pi * x)
+            self._functions[place] = TimeFunction(x - node.data.knots[i] if node.op == "table" else x)
+        return self._functions[place]
+
+
+def _levels(node: Node) -> NDArray[np.float64]:
+    """Return the arguments at which a node switches."""
+    return np.array(node.data.knots if node.op == "table" else [0.0])
+
+
+def _crossings(pieces: Pieces, levels: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the times at which pieces have certain values."""
+    found = []
+    for slope, offset in pieces:
+        slope, offset = np.broadcast_arrays(np.atleast_1d(slope), offset)
+        with np.errstate(all="ignore"):
+            found.append(((levels[:, None] - offset) / slope).ravel())
+    return np.concatenate(found)
+
+
+def _repeated(piece: tuple[Any, Any], low: float, high: float, shift: float) -> NDArray[np.float64]:
+    """Return the times in an interval at which a piece is a whole number plus ``shift``."""
+    found = [np.empty(0)]
+    for slope, offset in zip(*map(np.ravel, np.broadcast_arrays(*piece)), strict=True):
+        ends = np.sort([slope * low + offset - shift, slope * high + offset - shift])
+        if not slope or not np.isfinite(ends).all():
+            continue
+        if ends[1] - ends[0] > MOST:
+            raise TooMany
+        found.append((np.arange(np.floor(ends[0]), np.ceil(ends[1]) + 1.0) + shift - offset) / slope)
+    return np.concatenate(found)
+
+
+def _sorted(times: list[NDArray[np.float64]]) -> NDArray[np.float64]:
+    joined = np.concatenate(times)
+    return np.unique(joined[np.isfinite(joined)]) + 0.0  # no negative zero
 
 
 def depends_on_time_between_switches(system: System) -> bool:

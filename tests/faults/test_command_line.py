@@ -62,8 +62,8 @@ RUN --executor math:sin                                    | math:sin cannot be 
 RUN --executor ":"                                         | there is no executor ':': Empty module name
 RUN --executor ""                                          | there is no executor ''; give local,
 RUN --out /dev/null/x                                      | cannot write to the directory
-RUN --out /proc/x                                          | cannot write to the directory '/proc/x/cases':
-RUN --out /etc/passwd                                      | cannot write to the directory
+RUN --out /proc/x                                          | cannot write to the directory '/proc/x': No such
+RUN --out /etc/passwd                                      | '/etc/passwd' is no store of results: file is
 RUN --out x --report /dev/null/x                           | cannot write to the directory '/dev/null/x':
 RUN --step 1e-9                                            | the limit is
 RUN --step 1e-320                                          | the limit is

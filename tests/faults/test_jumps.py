@@ -176,3 +176,36 @@ def test_a_jump_beside_a_breakpoint_is_seen(method, side):
         solution = integrate(problem, method(**options, breakpoints=[3.0]), [5.0])
         exact_end = np.exp(-5.0) - np.expm1(-2.0) - np.expm1(-(5.0 - c))
         assert abs(solution.y[-1, 0] - exact_end) < 1e-9 or solution.warnings, distance
+
+
+def pulses(period, width, end):
+    """Return the field of y' = -y/10 + pulses around each period, and y at ``end`` from 0 at 0."""
+    field = VectorField(
+        lambda t, y, m: [
+            m.where(m.cos(2.0 * np.pi * t / period) > np.cos(np.pi * width), 1.0, 0.0) - 0.1 * y[0]
+        ],
+        dim=1,
+    )
+    starts = (np.arange(int(end / period) + 2) - 0.5 * width) * period
+    starts, ends = np.clip(starts, 0.0, end), np.clip(starts + width * period, 0.0, end)
+    return field, 10.0 * np.sum(np.exp(0.1 * (ends - end)) - np.exp(0.1 * (starts - end)))
+
+
+def pulse_search(count):
+    """Return the largest error of some random trains of pulses."""
+    rng, worst = np.random.default_rng(5), 0.0
+    for _ in range(count):
+        end = rng.uniform(5.0, 40.0)
+        field, expected = pulses(rng.uniform(0.5, 3.0), rng.uniform(0.005, 0.2), end)
+        solution = integrate(Problem(field, y0=[0.0], t_end=end), HBVM(), [end])
+        worst = max(worst, abs(solution.y[-1, 0] - expected))
+    return worst
+
+
+def test_no_pulse_of_a_train_is_missed():
+    assert pulse_search(6) < 1e-10  # 5 of 12 trains were wrong, by up to 0.1
+
+
+@pytest.mark.slow
+def test_no_pulse_of_a_train_is_missed_in_a_search():
+    assert pulse_search(200) < 1e-10

@@ -357,7 +357,7 @@ class TestTables:
         times = np.linspace(0.0, 10.0, 21)
         values = np.random.default_rng(5).uniform(-1.0, 1.0, 21)
         system = VectorField(lambda t, y, m: [y[1], -y[0] + m.table(t, times, values)], dim=2)
-        assert Switches(system).times(system.pack()).tolist() == times.tolist()
+        assert Switches(system).times(system.pack(), 0.0, 1.0)[0].tolist() == times.tolist()
         problem = Problem(system, y0=[1.0, 0.0], t_end=10.0)
         steps = integrate(problem, method, times=[10.0], sample="steps")
         assert set(times[1:].tolist()) <= set(steps.t.tolist())
@@ -371,7 +371,7 @@ class TestTables:
 
     def test_jumps_in_time_are_landed_on(self):
         system = VectorField(lambda t, m: [m.where((t > 1.0) & (t < 2.5), 1.0, 0.0)], dim=1)
-        assert Switches(system).times(system.pack()).tolist() == [1.0, 2.5]
+        assert Switches(system).times(system.pack(), 0.0, 1.0)[0].tolist() == [1.0, 2.5]
         solution = integrate(Problem(system, y0=[0.0], t_end=4.0), HBVM())
         # Measured 0.
         assert abs(solution.y[-1, 0] - 1.5) < 1e-15

@@ -21,9 +21,46 @@ CASES = {
     "a sum": (lambda t, par, m: m.sum(lambda i: m.where(t > par.many[i], 1, 0), range(3)), [0.5, 1.5, 3.0]),
     "no time": (lambda y, par, m: m.where(y[0] > par.c, 1, 0), []),
     "time and state": (lambda t, y, m: m.where(t > y[0], 1, 0), []),
-    "not affine": (lambda t, par, m: m.where(m.sin(t) > 0.3, 1, 0) + m.where(t * t > par.c, 1, 0), []),
+    "not affine": (lambda t, par, m: m.where(m.sin(t) > 0.3, 1, 0) + m.where(t * t > par.c, 1, 0),
+                   [np.arcsin(0.3), 2.7**0.5, np.pi - np.arcsin(0.3)]),
     "never": (lambda t, par, m: m.where(0 * t > par.c, 1, 0), []),
 }  # fmt: skip
+
+
+PERIODIC = {
+    "a cosine": (lambda t, f: f.cos(6.5 * t) > 0.99),
+    "a rest": (lambda t, f: t / 1.3 - f.round(t / 1.3) > 0.49),
+    "a chirp": (lambda t, f: f.sin(t * t) * f.exp(-t / 10) > 0.3),
+    "poles": (lambda t, f: f.tan(t) > 1),
+    "one narrow bump": (lambda t, f: f.exp(-(((t - 5) / 1e-3) ** 2)) > 0.5),
+    "a rounded wave": (lambda t, f: f.floor(3 * f.sin(t)) > 0.5),
+    "two of them": (lambda t, f: (f.sin(t) > 0.9) | (f.cos(7 * t) > 0.95)),
+}
+
+
+def times_of(system, par):
+    return Switches(system).times(par, 0.05, 4.95)[0]
+
+
+@pytest.mark.parametrize("name", PERIODIC)
+def test_no_switch_of_a_periodic_condition_is_missed(name):
+    condition = PERIODIC[name]
+    system = VectorField(lambda t, m: [m.where(condition(t, m), 1.0, 0.0)], dim=1)
+    times, near, far = Switches(system).times(system.pack(), 0.1, 30.0)
+    assert (near, far) == (0.1, 30.0)
+    ends = np.concatenate([[0.1], times, [30.0]])
+    parts = np.linspace(0.01, 0.99, 50)[:, None]
+    sides = condition(ends[:-1] + np.diff(ends) * parts, np)
+    assert (sides == sides[0]).all()  # nothing happens between two of them
+    assert times.size >= 2
+
+
+def test_many_switches_come_in_parts():
+    system = VectorField(lambda t, m: [m.where(m.cos(2 * np.pi * t) > 0.5, 1.0, 0.0)], dim=1)
+    times, near, far = Switches(system).times(system.pack(), 0.0, 1e7)
+    assert near == 0.0
+    assert far == 1e7 / 2.0**12
+    assert times.size == pytest.approx(2 * far, abs=2)
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -35,7 +72,7 @@ def test_switches_are_solved_for(case):
         return [formula(*(given[name] for name in formula.__code__.co_varnames))]
 
     system = VectorField(field, dim=1, parameters=C)
-    assert Switches(system).times(system.pack()) == pytest.approx(np.array(expected), rel=1e-15)
+    assert times_of(system, system.pack()) == pytest.approx(np.array(expected), rel=1e-15)
 
 
 def test_they_follow_the_parameters():
@@ -43,4 +80,4 @@ def test_they_follow_the_parameters():
     switches = Switches(system)
     assert switches.any
     for c in (-3.0, 0.1, 17.25):
-        assert switches.times(system.pack({"c": c})).tolist() == [c]
+        assert switches.times(system.pack({"c": c}), -20.0, 20.0)[0].tolist() == [c]

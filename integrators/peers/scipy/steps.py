@@ -90,6 +90,9 @@ class SciPyStepper(StepperBase):
         self._stats.evaluations = 0
         self._stats.extra["side_evaluations"] = 0
         self._made: Any = None
+        with QUIET():
+            # Raises `UserError` where the field does so at the start; the solver's first evaluation is this one.
+            self._first: tuple[float, Array, Array] | None = (t, self._y, self._field(t, self._y))
 
     @property
     def _solver(self) -> Any:
@@ -103,6 +106,9 @@ class SciPyStepper(StepperBase):
     def _evaluate(self, t: float, y: Array) -> Array:
         # SciPy's own count, nfev, leaves out the evaluations of its finite differences.
         self._stats.evaluations = (self._stats.evaluations or 0) + 1
+        first, self._first = self._first, None
+        if first is not None and first[0] == t and np.array_equal(first[1], y):
+            return first[2]
         return self._field(t, y)
 
     def _evaluate_aside(self, t: float, y: Array) -> Array:
@@ -167,6 +173,8 @@ class SciPyStepper(StepperBase):
     def _serve(self, grid: Array, how: str) -> tuple[Array, Array]:
         sign = self._towards(float(grid[-1]))
         states = np.empty((grid.size, self._y.size))
+        if not sign:
+            return grid[:0], states[:0]
         watch = stall_detector(self, self._solver.t, float(grid[-1]))
         for i, t in enumerate(grid.tolist()):
             self._bound(t if how == "stop" else self._end(sign))
@@ -185,6 +193,8 @@ class SciPyStepper(StepperBase):
     @QUIET()
     def _step_states(self, end: float) -> tuple[Array, Array]:
         sign = self._towards(end)
+        if not sign:
+            return np.empty(0), np.empty((0, self._y.size))
         self._bound(self._end(sign))
         watch = stall_detector(self, self._solver.t, end)
         times, states = [self._t], [self._y]
@@ -197,16 +207,24 @@ class SciPyStepper(StepperBase):
 
     @QUIET()
     def _one_step(self) -> tuple[float, Array] | None:
-        self._bound(self._end(self._solver.direction))
+        try:
+            self._bound(self._end(self._solver.direction))
+        except UserError as raised:
+            self._broken(raised, self._t, self._y)
+            return None
         if self._solver.t == self._t and not self._step(StallDetector(self._t, self._t)):
             return None
         return float(self._solver.t), self._solver.y
 
     def _towards(self, end: float) -> float:
-        """Return the sign of the direction to ``end``, with a solver that goes that way."""
+        """Return the sign of the direction to ``end``, with a solver that goes that way; 0 if the field raised."""
         sign = 1.0 if end > self._t else -1.0
-        if self._solver.direction != sign:
-            self._made = self._begin(self._t, self._y, sign)
+        try:
+            if self._solver.direction != sign:
+                self._made = self._begin(self._t, self._y, sign)
+        except UserError as raised:
+            self._broken(raised, self._t, self._y)
+            return 0.0
         return sign
 
     def _step(self, watch: "StallDetector") -> bool:

@@ -30,15 +30,14 @@ def rigid_body():
 
 def test_lotka_volterra(lotka_volterra):
     gauss = errors_of(lotka_volterra, Gauss(s=2, h=0.1))
-    assert gauss["energy"] > 1e-4  # measured 1.0e-3
-    assert gauss["casimir"] > 1e-2  # measured 0.18
+    assert gauss["energy"] > 1e-4  # measured 3.8e-4
+    assert gauss["casimir"] > 1e-4  # measured 1.3e-3
     plain = errors_of(lotka_volterra, HBVM(k=16, s=2, h=0.1))
-    assert plain["energy"] <= 1e-14  # measured 4.2e-16
-    assert plain["casimir"] > 1e-2  # measured 0.21
+    assert plain["energy"] <= 1e-14  # measured 5.0e-16
+    assert plain["casimir"] > 1e-4  # measured 1.5e-3
     both = errors_of(lotka_volterra, LineIntegral(k=16, s=2, h=0.1, invariants=["energy", "casimir"]))
-    assert both["energy"] <= 1e-14  # measured 1.9e-16
-    # Of the size 0.05 from terms of size 1: rounding the state alone makes 8.6e-15. The mean is 2e-15.
-    assert both["casimir"] <= 3e-14  # measured 1.3e-14
+    assert both["energy"] <= 1e-14  # measured 7.3e-17
+    assert both["casimir"] <= 1e-15  # measured 5.5e-17
 
 
 def test_rigid_body_with_a_quartic_energy(rigid_body):

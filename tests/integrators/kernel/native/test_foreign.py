@@ -129,7 +129,11 @@ def test_where_a_function_is_not_defined_is_a_status_with_the_time(field):
     problem = Problem(Opaque(field, dim=1, name="ends"), y0=[0.0], t_end=9.0)
     made = integrate(problem, HBVM(k=4, s=2, h=0.01), sample="steps")
     assert made.status is Status.NOT_FINITE
-    assert made.reason == f"the vector field is not finite in the step from t = {made.t_stop!r}."
+    sentence = f"the vector field is not finite in the step from t = {made.t_stop!r}."
+    assert made.reason in (
+        sentence,
+        f"{sentence} There a function of yours raised ValueError (math domain error).",
+    )
     assert 0.4 < made.t_stop < 2.1
     assert np.isfinite(made.y).all()
     assert made.t[-1] == made.t_stop
@@ -225,7 +229,7 @@ def test_a_result_of_a_wrong_length_is_refused():
     with pytest.raises(InputError, match=r"three returns an array of shape \(3,\), not \(2,\)"):
         integrate(problem, HBVM(k=4, s=2, h=0.1))
     problem = Problem(Opaque(lambda t, y: "text", dim=2, name="text"), y0=[0.0, 0.0], t_end=1.0)
-    with pytest.raises(InputError, match="text returns 'text', not 2 numbers"):
+    with pytest.raises(InputError, match="what text returns must be numbers, not 'text'"):
         integrate(problem, HBVM(k=4, s=2, h=0.1))
 
 

@@ -21,11 +21,14 @@ METHODS = [
 @pytest.mark.parametrize("method", METHODS, ids=repr)
 def test_nothing_after_the_failure_comes_back(method, end):
     fall = problems.Problem(FALL, q0=[1.0, 0.0], p0=[0.0, 0.0], t_end=5.0)
-    solution = integrate(fall, method, np.linspace(0.0, end, 1001))
-    assert solution.status is Status.NONLINEAR_DIVERGENCE
-    assert solution.t[-1] <= np.nextafter(solution.t_stop, np.inf)
+    # A stepper without a destination looks ahead; `integrate` shortens the last step to 1.109, and finishes.
+    stepper = method.compile(FALL).start(fall.y0, fall.par)
+    samples = stepper.advance(np.linspace(0.0, end, 1001))
+    assert samples.status is Status.NONLINEAR_DIVERGENCE
+    assert samples.t[-1] <= np.nextafter(stepper.t, np.inf)
     # Measured 1.3e-3 at most (h = 0.1, its last own step); states inside the failed step had 0.05 to 179.
-    assert solution.errors()["energy"].max() < 1e-2
+    energy = fall.invariants(samples.y)["energy"]
+    assert np.abs(energy + 1.0).max() < 1e-2
 
 
 def test_nor_from_a_batch():

@@ -7,7 +7,7 @@ from numba import TypingError
 import problems
 from integrators.coefficients import legendre
 from integrators.kernel import tables
-from integrators.kernel.native import binary, field
+from integrators.kernel.native import binary, stages
 from integrators.kernel.program import HBVMProgram
 from integrators.protocol import Status
 from problems import Hamiltonian, Problem, VectorField, emit
@@ -216,7 +216,7 @@ def test_a_field_that_cannot_run_on_lanes_runs_stage_by_stage(chain, driven, mon
 
     kernel = {name: code for name, code in binary._loaded.items() if code.note == " "}
     monkeypatch.setattr(binary, "_loaded", kernel)
-    monkeypatch.setattr(field, "build_on_lanes", refuse)
+    monkeypatch.setattr(stages, "build_on_lanes", refuse)
     monkeypatch.setenv("HBVM_BENCH_CACHE", str(tmp_path))
     for problem, (states, stepper) in zip(problems, expected, strict=True):
         found, alone = steps_of(problem, 6, 3, 0.2, 5)
