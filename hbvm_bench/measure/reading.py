@@ -74,7 +74,8 @@ def case_of(record: Record, series: Series) -> Measured | None:
 
     A report has of a case only what is drawn: errors and distances, and not what a worker returned.
     """
-    if record.result.outcome not in ("ok", "stalled") or "y" not in series or "distance" in series:
+    returned = {"t", "y"} <= {*series} and "distance" not in series
+    if record.result.outcome not in ("ok", "stalled") or not returned:
         return None
     problem = make_problem(record.case.problem)
     known = solutions.find(problem)

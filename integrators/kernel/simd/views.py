@@ -13,7 +13,6 @@ from typing import Any
 
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
 from numba.extending import models, register_model
 
 from integrators.kernel.simd.emit import ALIGNMENT, DOUBLE, INTEGER, vector
@@ -161,7 +160,8 @@ def _room(context, builder, sig, args):
     like, n = sig.args
     count = like.count if isinstance(like, Rows) else 1
     kind = vector(count) if count > 1 else DOUBLE
-    memory = cgutils.alloca_once(builder, kind, size=ir.Constant(INTEGER, n.literal_value))
+    with builder.goto_entry_block():  # once, also in a loop
+        memory = builder.alloca(kind, size=ir.Constant(INTEGER, n.literal_value))
     memory.align = _aligned(count)
     return builder.bitcast(memory, DOUBLE.as_pointer())
 

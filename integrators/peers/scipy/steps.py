@@ -91,7 +91,7 @@ class SciPyStepper(StepperBase):
         self._stats.extra["side_evaluations"] = 0
         self._made: Any = None
         with QUIET():
-            # Raises `UserError` where the field does so at the start; the solver's first evaluation is this one.
+            # Raises `UserError` where the field does so at the start; the solver's first evaluation.
             self._first: tuple[float, Array, Array] | None = (t, self._y, self._field(t, self._y))
 
     @property
@@ -217,7 +217,7 @@ class SciPyStepper(StepperBase):
         return float(self._solver.t), self._solver.y
 
     def _towards(self, end: float) -> float:
-        """Return the sign of the direction to ``end``, with a solver that goes that way; 0 if the field raised."""
+        """Return the sign of the direction to ``end``, with a solver that goes there; 0: the field raised."""
         sign = 1.0 if end > self._t else -1.0
         try:
             if self._solver.direction != sign:

@@ -142,7 +142,7 @@ def keep(run, directory):
         store = Store(Path(folder))
         store.prepare()
         for one in run.records:
-            store.save(one, {"t": np.arange(2.0), "y": np.zeros((2, 2))})
+            store.save(one, {"t": np.arange(2.0), "y": np.zeros((2, 4))})
         store.write_index(run.index)
         return report_on([store], directory)
 

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from integrators.kernel.native import binary, field
+from integrators.kernel.native import binary, stages
 from integrators.kernel.simd.lanes import fma, two_sum
 from problems import double_double
 
@@ -28,7 +28,7 @@ class OnLanes:
     """A function of rows of lanes, compiled and called on arrays (inputs, count)."""
 
     def __init__(self, function, count, outputs):
-        code = field.build_on_lanes(function, count)
+        code = stages.build_on_lanes(function, count)
         self.call = ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 4)(binary.load(code))
         self.count, self.outputs = count, outputs
 
