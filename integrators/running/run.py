@@ -9,7 +9,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from integrators import registry
 from integrators.events.event import Event
-from integrators.protocol import Array, Destination, DoubleDouble, MethodBase, Status, check_problem, offers
+from integrators.protocol import (
+    Array,
+    Destination,
+    DoubleDouble,
+    MethodBase,
+    Samples,
+    Status,
+    check_problem,
+    offers,
+)
 from integrators.refusals import check_interval, check_parameters, check_state, check_times
 from integrators.running.digits import as_pairs, check_digits, pairs
 from integrators.running.integrate import prepared, started, wanted_events
@@ -351,11 +360,22 @@ class Run:
                 else:  # the stepper does so itself
                     self._way *= -1.0
                     self._bound(self.t)
-            samples = self._stepper.advance(np.array([goal]))
-            self._shown = (goal, samples.y[0]) if samples.t.size else None
+            samples = self._advance(goal)
+            self._shown = (float(samples.t[0]), samples.y[0]) if samples.t.size else None
             if self._terminates and self._stepper.status is Status.RUNNING:
                 self._look_to(goal)
         return self.y
+
+    def _advance(self, goal: float) -> Samples:
+        """Integrate to a time; where that lies beyond the end ahead, a step ends there."""
+        end = self._stepper.destination if offers(self._stepper, Destination) else None
+        if end is not None and (goal - end) * self._way > 0.0:
+            if (end - self._stepper.t) * self._way > _rounding(end):
+                samples = self._stepper.advance(np.array([end]))
+                if samples.status is not Status.FINISHED:
+                    return cast("Samples", samples)
+            self._stepper.destination = None
+        return cast("Samples", self._stepper.advance(np.array([goal])))
 
     def _look_to(self, goal: float) -> None:
         """Look whether a terminal event lies in the part of the step ahead that ends at ``goal``."""
