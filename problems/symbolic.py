@@ -80,9 +80,7 @@ def from_sympy(
             raise InputError(f"the parameter {text!r} must be named as a variable is; rename the symbol.")
     times = {sympy.Symbol("t") if t is None else t}
     defaults = {text: float(values[symbol]) for symbol, text in names.items()}
-    if hasattr(type(expression), "mass_matrix_full") and hasattr(
-        expression, "u"
-    ):  # a property that may raise
+    if hasattr(type(expression), "mass_matrix_full") and hasattr(expression, "u"):  # it may raise
         state = [*expression.q, *expression.u]
         try:
             matrix, forcing = expression.mass_matrix_full, expression.forcing_full

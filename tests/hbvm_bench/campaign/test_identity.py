@@ -61,7 +61,7 @@ def test_nothing_that_a_worker_loads_is_left_out(method, module):
     loaded = set(subprocess.run(command, capture_output=True, text=True, check=True).stdout.split())
     kept = set(sources([INTEGRATES, module, "problems.catalogue.kepler"]))
     said = {name for name in loaded if name.startswith(BOOKKEEPING)}
-    assert {"hbvm_bench.campaign.identity", "hbvm_bench.store.store", "problems.picture"} <= said
+    assert {"hbvm_bench.campaign.identity", "hbvm_bench.store.arrays", "problems.picture"} <= said
     assert not kept & said
     made_by = {
         "problems",
