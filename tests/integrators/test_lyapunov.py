@@ -89,7 +89,7 @@ def test_the_divergence_of_declared_sums():
     """A sum that stays a loop: the diagonal of its Jacobian stands in a list."""
 
     def cubic(y, m):
-        return [-m.sum(lambda j, i=i: y[i] * y[j] ** 2, range(40)) for i in range(40)]
+        return m.each(lambda i: -m.sum(lambda j: y[i] * y[j] ** 2, range(40)), range(40))
 
     system = VectorField(cubic, dim=40)
     problem = Problem(system, y0=np.linspace(0.1, 0.5, 40), t_end=2.0)
