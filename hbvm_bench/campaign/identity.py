@@ -304,8 +304,10 @@ def _imported(tree: ast.Module, package: str) -> set[str]:
             above = package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
             origin = ".".join([*above, *([node.module] if node.module else [])])
             names |= {origin} | {f"{origin}.{alias.name}" for alias in node.names}
-        elif isinstance(node, ast.Assign) and _called(node.value) == "Engine":  # in `kernel.engines`
-            names |= {f"{package}.{ast.literal_eval(node.value.args[0])}"}
+        elif isinstance(node, ast.Assign):
+            made = node.value
+            if isinstance(made, ast.Call) and _called(made) == "Engine":  # in `integrators.kernel.engines`
+                names |= {f"{package}.{ast.literal_eval(made.args[0])}"}
         elif not (isinstance(node, ast.If) and getattr(node.test, "id", "") == "TYPE_CHECKING"):
             for blocks in ("body", "orelse", "finalbody", "handlers", "cases"):  # statements only: quick
                 block = getattr(node, blocks, ())
