@@ -2,7 +2,6 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize.elementwise import find_root
 
 from problems.analysis.ranges import RANGES, Range
 from problems.calculus.forward import Slopes
@@ -98,6 +97,8 @@ class TimeFunction:
         change = (value(a, side) > 0.0) != (value(b, side) > 0.0)
         if not change.any():
             return np.empty(0)
+        from scipy.optimize.elementwise import find_root  # few conditions need it, every process would load it
+
         tolerances = {"xrtol": 2.0**-52, "xatol": 0.0, "fatol": 0.0, "frtol": 0.0}
         bracket = a[change], b[change]
         return find_root(value, bracket, args=(side[change],), tolerances=tolerances, maxiter=ITERATIONS).x

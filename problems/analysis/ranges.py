@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy.special
 from numpy.typing import NDArray
 
 from problems.evaluate.evaluator import Numbers
@@ -90,9 +89,14 @@ class Range:
 
 def _monotonic(name: str) -> Callable[[Range], Range]:
     """Return an elementary function that rises, or falls, all over its domain."""
-    function, (first, last) = getattr(np, name, None) or getattr(scipy.special, name), FUNCTIONS[name].domain
+    first, last = FUNCTIONS[name].domain
 
     def ranges(x: Range) -> Range:
+        function = getattr(np, name, None)
+        if function is None:
+            import scipy.special  # few problems have it in a condition, and every process would load it
+
+            function = getattr(scipy.special, name)
         low, high, middle = (function(np.clip(end, first, last)) for end in (x.low, x.high, x.middle))
         return Range(high, low, middle) if name in _DECREASING else Range(low, high, middle)
 
