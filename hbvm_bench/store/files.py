@@ -1,7 +1,5 @@
 """Files that are complete or not there, and directories that can be written."""
 
-import csv
-import io
 import os
 import tempfile
 import threading
@@ -41,16 +39,9 @@ def json_of(value: Any) -> bytes:
     return msgspec.json.format(msgspec.json.encode(value), indent=1) + b"\n"
 
 
-def csv_of(rows: Iterable[Iterable[object]]) -> bytes:
-    """Return rows as comma-separated text, which no spreadsheet takes for formulas."""
-    stream = io.StringIO()
-    csv.writer(stream, lineterminator="\n").writerows(map(_as_text, row) for row in rows)
-    return stream.getvalue().encode()
-
-
-def _as_text(cell: object) -> object:
+def spreadsheet_text(cell: str) -> str:
     """Return a cell that spreadsheets show as it is: an apostrophe goes before what would be a formula."""
-    if not isinstance(cell, str) or not cell.startswith(("=", "+", "-", "@", "\t", "\r")):
+    if not cell.startswith(("=", "+", "-", "@", "\t", "\r")):
         return cell
     try:
         float(cell)

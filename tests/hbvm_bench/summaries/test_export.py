@@ -8,8 +8,9 @@ from msgspec.structs import replace
 
 from hbvm_bench.campaign.entries import Checks, Ensemble
 from hbvm_bench.campaign.grid import Grid
-from hbvm_bench.store.files import csv_of, json_of
+from hbvm_bench.store.files import json_of
 from hbvm_bench.summaries import export
+from hbvm_bench.summaries.frame import case, framed
 from tests.hbvm_bench import made_up_run
 
 
@@ -40,7 +41,7 @@ def test_json_has_the_grid_the_checks_and_the_ensemble_with_their_defaults(recor
 
 
 def test_two_ensembles_of_a_problem_differ_in_the_table(records):
-    text = csv_of([list(export.CASES), *map(export._case, records)]).decode()
+    text = framed([case(record) for record in records]).to_csv(index=False)
     rows = list(csv.DictReader(text.splitlines()))
     assert rows[0]["ensemble"] == ""
     assert [json.loads(row["ensemble"])["count"] for row in rows[1:]] == [10, 20]
