@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from problems.analysis import deviations
 from problems.analysis.structure import has_kinks, switches_in_time
-from problems.emit.leaving import leaves_range
+from problems.graph.nodes import T
 from problems.problem import Problem, System
-from problems.trace.graph import T
+from problems.targets.leaving import leaves_range
 
 FEWEST = 4  # nodes whose coefficients can show a discontinuity
 ENOUGH = 8  # nodes with which a smooth field is not taken for one with a discontinuity

@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from integrators import registry
 from integrators.protocol import MethodBase
 from problems.errors import InputError, shown
+from problems.graph.stored import items, refuse
 from problems.problem import Problem
 from problems.systems.base import System
 from problems.systems.hamiltonian import Hamiltonian
 from problems.systems.lagrangian import Lagrangian
 from problems.systems.poisson import Poisson
 from problems.systems.vector_field import VectorField
-from problems.trace.stored import items, refuse
 
 _SYSTEMS = {kind.__name__: kind for kind in (Hamiltonian, Lagrangian, Poisson, VectorField)}
 

@@ -12,7 +12,7 @@ from typing import Annotated, Any, ClassVar, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from problems import emit
+from problems import targets
 from problems.checks import CheckedOptions, Must
 from problems.errors import InputError, shown
 from problems.systems.base import System
@@ -233,7 +233,7 @@ class Reducer:
                     "Maximum or Histogram of integrators.reduce."
                 )
         self._evaluate = {
-            name: emit.numpy(system, system.trace(reduction.g, f"reduction {name!r}"))
+            name: targets.numpy(system, system.trace(reduction.g, f"reduction {name!r}"))
             for name, reduction in reductions.items()
         }
         self._over_times = [name for name, reduction in reductions.items() if reduction.over == "times"]

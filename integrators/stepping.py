@@ -519,7 +519,7 @@ class FixedStep(MethodBase):
     def march(self, system: System) -> March:
         """Return the function that takes steps of ``system``, compiled with numba for speed.
 
-        ``problems.emit.numba(system, "field")`` is the right-hand side, ``f(t, y, par, out)``; a separable
+        ``problems.targets.numba(system, "field")`` is the right-hand side, ``f(t, y, par, out)``; a separable
         system also has ``"force"``, p', and ``"velocity_scale"``, c with q' = c p. The field of a
         `problems.Opaque` is Python code; the uncompiled function is then called.
 

@@ -10,7 +10,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from problems import emit
+from problems import targets
 from problems.analysis import deviations, invariants
 from problems.checks import NOTHING, Named, checked_arguments
 from problems.errors import InputError, printable, shown
@@ -222,7 +222,7 @@ class Problem:
     def _identity(self) -> tuple[Any, ...]:
         return (
             self.written(),
-            emit.fingerprint(self.system),
+            targets.fingerprint(self.system),
             self.y0.tobytes(),
             self.par.tobytes(),
             self.t0,

@@ -6,10 +6,10 @@ from typing import Any
 
 from problems.checks import checked_arguments
 from problems.errors import InputError, MissingLibraryError, shown
+from problems.graph.nodes import Node
 from problems.systems.base import System
 from problems.systems.hamiltonian import Hamiltonian
 from problems.systems.vector_field import VectorField
-from problems.trace.graph import Node
 
 FUNCTIONS = {
     "sin": "sin", "cos": "cos", "tan": "tan", "exp": "exp", "log": "log", "Abs": "abs", "sinh": "sinh",

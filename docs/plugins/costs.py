@@ -170,11 +170,11 @@ def _diffrax() -> tuple[Problem, Array, list[tuple[str, Run]]]:
     import diffrax as dx  # isort: skip -- the plugin says what to install where it is missing
     import jax
 
-    from problems import emit
+    from problems import targets
 
     jax.config.update("jax_enable_x64", True)
     problem, end = _pendulum()
-    term = dx.ODETerm(emit.jax(problem.system, "field"))
+    term = dx.ODETerm(targets.jax(problem.system, "field"))
     par, times = map(jax.numpy.asarray, (problem.par, np.linspace(0.0, problem.t_end, 11)[1:]))
 
     def run(solver: Any, h: float | None, tolerance: float | None = None) -> Run:

@@ -23,7 +23,7 @@ from hbvm_bench.measure.timing import interleaved
 from hbvm_bench.report.markdown import printed
 from hbvm_bench.summaries.table import Table
 from integrators.dynamics.recorded import Recorded
-from problems import Problem, emit
+from problems import Problem, targets
 
 Array = NDArray[np.float64]
 WIDTH = 20
@@ -71,7 +71,7 @@ def host(problem: Problem, adjoint: Any, h: float | None, tolerance: float | Non
     import diffrax as dx
     import jax
 
-    term = dx.ODETerm(emit.jax(problem.system, "field"))
+    term = dx.ODETerm(targets.jax(problem.system, "field"))
     controller = dx.ConstantStepSize() if tolerance is None else dx.PIDController(tolerance, tolerance)
 
     def value(par: Any) -> Any:

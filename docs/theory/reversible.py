@@ -13,7 +13,7 @@ import numpy as np
 
 import problems
 from integrators import HBVM, IAS15, Gauss, Status, Taylor
-from problems import emit
+from problems import targets
 
 PARTS = 20
 STUDENT = 2.1009  # the 97.5 % quantile of Student's distribution with PARTS - 2 degrees of freedom
@@ -47,9 +47,9 @@ def row(problem: problems.Problem, method: Any, revolutions: int) -> str:
     stepper.step()  # to the end of a step, from which reversible steps are the same backwards
     back = stepper.advance(np.array([problem.t0]))
     miss = f"{np.abs(back.y[-1] - problem.y0).max():.1e}" if back.status is Status.FINISHED else back.reason
-    energy = emit.numpy(problem.system, "hamiltonian")(0.0, np.column_stack([problem.y0, y.T]), problem.par)[
-        0
-    ]
+    energy = targets.numpy(problem.system, "hamiltonian")(
+        0.0, np.column_stack([problem.y0, y.T]), problem.par
+    )[0]
     error = (energy[1:] / energy[0] - 1.0).reshape(PARTS, -1)
     at = (np.arange(PARTS) + 0.5) / PARTS * done
     away = at - at.mean()

@@ -27,7 +27,7 @@ from hbvm_bench.campaign.file import Case, Checks
 from hbvm_bench.campaign.spec import Spec, parse_spec
 from integrators.kernel.native import store as kept
 from integrators.protocol import MethodBase
-from problems import emit
+from problems import targets
 from problems.errors import InputError, unknown
 from problems.problem import Problem
 
@@ -150,7 +150,7 @@ def case_key(case: Case, problem: Problem, method: MethodBase) -> dict[str, Any]
     return (
         {
             "problem": case.problem,
-            "field": emit.fingerprint(problem.system),
+            "field": targets.fingerprint(problem.system),
             "start": [value.hex() for value in (problem.t0, problem.t_end, *problem.y0.tolist())],
             "parameters": [value.hex() for value in problem.par.tolist()],
             "method": type(method).__name__,

@@ -9,7 +9,7 @@ from hbvm_bench.measure import machine
 from hbvm_bench.report.markdown import printed
 from hbvm_bench.summaries.table import Table
 from integrators.kernel.native import stages
-from problems import emit
+from problems import targets
 from problems.problem import Problem
 
 CASES = (
@@ -56,7 +56,7 @@ class Times(NamedTuple):
 def measure(text: str) -> Times:
     """Trace, emit and compile the vector field of a problem, as it prints, from nothing."""
     traced, problem = _seconds(lambda: _traced(text))
-    emitted, source = _seconds(lambda: emit.source(problem.system, "field", "numba"))
+    emitted, source = _seconds(lambda: targets.source(problem.system, "field", "numba"))
     scalar, lanes = _seconds(lambda: _compiled(problem))[0], _seconds(lambda: _on_lanes(problem))[0]
     lines = source.text.count("\n")
     return Times(repr(problem), problem.system.dim, traced, emitted, lines, scalar, lanes)
@@ -108,4 +108,4 @@ def _on_lanes(problem: Problem) -> None:
 
 
 def _function(problem: Problem, name: str) -> Any:
-    return emit.numba(problem.system, name).py_func
+    return targets.numba(problem.system, name).py_func

@@ -14,9 +14,9 @@ from hbvm_bench.store.files import write_all
 from hbvm_bench.summaries import findings
 from problems import registry
 from problems.analysis import structure
-from problems.analysis.latex import latex
 from problems.errors import InputError
 from problems.problem import Problem
+from problems.targets.latex import latex
 
 BEGIN, END = "<!-- made by: hbvm-bench gallery docs -->", "<!-- end of what is made -->"
 """Between them stands what is made; all else on a page is written by hand and stays."""

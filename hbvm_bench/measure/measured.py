@@ -14,7 +14,7 @@ from hbvm_bench.measure.starts import members
 from hbvm_bench.reference.solutions import Reference
 from hbvm_bench.store.records import Compile, Counters, ErrorGrowth, Result, Timing
 from integrators.protocol import Status
-from problems import emit
+from problems import targets
 from problems.analysis import deviations
 from problems.problem import Problem
 
@@ -242,7 +242,7 @@ def ahead(problem: Problem, t: Array, y: Array, difference: Array) -> Array:
     Positions and momenta are each measured in units of their largest value, so that turning
     points, where nothing moves, and the units of either do not matter.
     """
-    field_ = emit.numpy(problem.system, "field")
+    field_ = targets.numpy(problem.system, "field")
     flow = np.array([field_(time, state, problem.par) for time, state in zip(t, y, strict=True)])
     flow = flow.reshape(y.shape)
     along, speed = np.zeros(len(t)), np.zeros(len(t))

@@ -20,7 +20,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from problems import emit
+from problems import targets
 from problems.errors import InputError, MissingLibraryError
 from problems.problem import Problem
 from problems.systems.base import System
@@ -184,7 +184,7 @@ _known: ContextVar[dict[tuple[str, ...], ReferenceFile]] = ContextVar("reference
 
 def _key(problem: Problem) -> tuple[str, ...]:
     end = float(problem.t_end).hex()
-    return (*start(problem), *hexadecimal(problem.par), emit.fingerprint(problem.system), end)
+    return (*start(problem), *hexadecimal(problem.par), targets.fingerprint(problem.system), end)
 
 
 @lru_cache(maxsize=64)
@@ -209,7 +209,7 @@ def file_from(
         start=start(problem),
         parameters=hexadecimal(problem.par),
         provenance=provenance
-        | {"field": emit.fingerprint(problem.system), "t_end": repr(float(problem.t_end))},
+        | {"field": targets.fingerprint(problem.system), "t_end": repr(float(problem.t_end))},
         t=hexadecimal(times),
         y=states,
         condition=[] if condition is None else [float(f"{value:.2g}") for value in condition.tolist()],
@@ -348,11 +348,11 @@ def _expressions(system: System, hy: Any, real: Any) -> list[Any]:
     With double literals heyoka would turn a division by 3 into a multiplication
     by the double next to 1/3, whatever the precision of the integration.
     """
-    source = emit.source(system, "field", "heyoka")
+    source = targets.source(system, "field", "heyoka")
     tree = ast.fix_missing_locations(_Numbers().visit(ast.parse(source.text)))
     namespace: dict[str, Any] = {"number": lambda value: hy.expression(real(value))}
     exec(compile(tree, "<field>", "exec"), namespace)  # noqa: S102 -- emitted from a graph
-    variables = [variable for variable, _ in emit.heyoka(system)]
+    variables = [variable for variable, _ in targets.heyoka(system)]
     derivatives = namespace[source.name](hy.time, variables, hy.par, hy)
     derivatives = [e if isinstance(e, hy.expression) else hy.expression(real(e)) for e in derivatives]
     return list(zip(variables, derivatives, strict=True))

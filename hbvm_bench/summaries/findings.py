@@ -15,13 +15,13 @@ from hbvm_bench.summaries.table import Table
 from integrators.methods.automatic import exact_k
 from integrators.peers.rebound.whfast512 import NO_AVX512
 from integrators.protocol import MethodBase
-from problems import emit
+from problems import targets
 from problems.analysis import structure
-from problems.analysis.latex import latex
 from problems.catalogue import expression
 from problems.errors import InputError, unknown
 from problems.problem import Problem
 from problems.systems.base import System
+from problems.targets.latex import latex
 
 SHORTEST = 3
 """Letters that a formula's only name may have: q, p10."""
@@ -195,7 +195,7 @@ def _instance(cls: type[MethodBase]) -> MethodBase:
 
 def _emitted(problem: Problem, library: str) -> str | None:
     try:
-        emit.source(problem.system, "field", library)
+        targets.source(problem.system, "field", library)
     except InputError as error:
         return str(error)
     return None

@@ -12,9 +12,9 @@ from integrators.protocol import Array, MethodBase, check_problem
 from integrators.refusals import check_times
 from integrators.running.integrate import prepared
 from integrators.running.variations import START, TIME, places
-from problems import emit
-from problems.calculus.reverse import reverse
+from problems import targets
 from problems.checks import Must, checked_arguments
+from problems.derive.reverse import reverse
 from problems.errors import InputError, shown, unknown
 from problems.problem import Problem
 from problems.quantities import plain_numbers
@@ -119,7 +119,7 @@ def gradient(
     recorded = Recorded(program, problem, grid, memory=memory)
     par = [np.concatenate([problem.par, row.reshape(-1)]) for row in rows]
     samples = list(zip(grid.tolist(), recorded.y, par, strict=True))
-    values = emit.numpy_of(function, "loss")
+    values = targets.numpy_of(function, "loss")
     value = sum(float(values(t, y, numbers)[0]) for t, y, numbers in samples)
     back, by_par = recorded.pulled_back(_slopes(function, "state", samples), parameters=inner)
     if inner:
@@ -129,7 +129,7 @@ def gradient(
         if name == START:
             grads[name] = back
         elif name == TIME:
-            grads[name] = -back @ emit.numpy(system, "field")(problem.t0, problem.y0, problem.par)
+            grads[name] = -back @ targets.numpy(system, "field")(problem.t0, problem.y0, problem.par)
         else:
             grads[name] = by_par[slices[name]].reshape(np.shape(system.parameters[name]))
     return value, {name: np.asarray(each) for name, each in grads.items()}
@@ -161,7 +161,7 @@ def _slopes(function: Any, variables: Any, samples: list[tuple[float, Array, Arr
     """Return the derivatives of a function at samples, one row for each."""
     _, y, par = samples[0]
     count = y.size if variables == "state" else par.size
-    slopes = emit.numpy_of(
+    slopes = targets.numpy_of(
         reverse(function, variables=variables, count=count, name="loss_slope"), "loss_slope"
     )
     return np.array([slopes(t, np.concatenate([[1.0], y]), numbers) for t, y, numbers in samples])

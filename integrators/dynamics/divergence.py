@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 
 from integrators.protocol import Array
-from problems import emit
+from problems import targets
+from problems.graph.nodes import STATE, T
 from problems.problem import Problem, System
-from problems.trace.graph import STATE, T
 
 WORK = 1 << 24  # products of derivatives that are computed, about, where the Jacobian is not written down
 
@@ -67,7 +67,7 @@ class _Trace:
         self._system, self._par = system, par
         self.known, self.constant = jacobian is not None, False
         if jacobian is None:
-            self._along = emit.numpy_of(system.tangent("field", 1, parameters=False), "along")
+            self._along = targets.numpy_of(system.tangent("field", 1, parameters=False), "along")
             return
         diagonal = np.flatnonzero(jacobian.rows == jacobian.columns)
         function = jacobian.function
@@ -76,7 +76,7 @@ class _Trace:
             diagonal = np.arange(diagonal.size)
         self.constant = not any(node.flags & (T | STATE) for node in function.roots)
         self._diagonal = diagonal
-        self._entries = emit.numpy_of(function, "divergence") if diagonal.size else None
+        self._entries = targets.numpy_of(function, "divergence") if diagonal.size else None
 
     def __call__(self, t: Array, y: Array) -> Array:
         """Return it at times (n,) and states (dim, n), shape (n,)."""

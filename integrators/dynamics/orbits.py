@@ -17,7 +17,7 @@ from integrators import registry
 from integrators.dynamics.vectors import with_variations
 from integrators.protocol import Array, MethodBase, Status
 from integrators.running.variations import places
-from problems import emit
+from problems import targets
 from problems.analysis.structure import depends_on_time
 from problems.checks import Must, at_least, checked_arguments
 from problems.errors import InputError, shown, unknown
@@ -268,7 +268,7 @@ class _Search:
         self.parameters = [int(i) for name in free if name in at for i in numbers[at[str(name)]]]
         if not (self.components or self.parameters or PERIOD in free):
             raise InputError("free=() leaves nothing to change; give components, 'period' or parameters.")
-        self.field = emit.numpy(system, "field")
+        self.field = targets.numpy(system, "field")
 
     def at(self, point: _Point) -> tuple[Array | None, Array, float]:
         """Return the residual, its derivatives by what is free, and the norm of the map.
@@ -394,7 +394,7 @@ def _signs(problem: Problem, start: Array, mirror: ArrayLike | None) -> Array | 
         )
     if system.traced and depends_on_time(system):
         raise InputError("the time is in the formula, so that no mirror reverses the flow; leave mirror out.")
-    field, rng = emit.numpy(system, "field"), np.random.default_rng(0)
+    field, rng = targets.numpy(system, "field"), np.random.default_rng(0)
     for _ in range(3):
         y = start + 1e-3 * max(float(np.abs(start).max()), 1.0) * rng.standard_normal(start.size)
         there, here = field(problem.t0, signs * y, problem.par), field(problem.t0, y, problem.par)

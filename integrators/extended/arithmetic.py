@@ -17,8 +17,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from problems import double_double
-from problems.emit.room import room
-from problems.trace.functions import WHOLE
+from problems.graph.functions import WHOLE
+from problems.targets.room import room
 
 Numbers = NDArray[np.complex128]
 """Arrays of numbers."""
@@ -227,7 +227,7 @@ class _Operators(ast.NodeTransformer):
 
 
 def compiled(text: str, name: str) -> Any:
-    """Compile what `problems.emit.source` has printed for numba, for numbers instead of doubles."""
+    """Compile what `problems.targets.source` has printed for numba, for numbers instead of doubles."""
     tree = ast.fix_missing_locations(_Operators().visit(ast.parse(text)))
     namespace: dict[str, Any] = {
         "np": np,

@@ -15,9 +15,9 @@ from integrators.refusals import check_parameters, check_start, one_thread
 from integrators.running.times import COUNTABLE
 from integrators.stepping import ProgramBase, RestorableStepper
 from problems.errors import InputError
+from problems.graph.functions import FUNCTIONS as ELEMENTARY
+from problems.graph.nodes import reachable
 from problems.problem import System
-from problems.trace.functions import FUNCTIONS as ELEMENTARY
-from problems.trace.graph import reachable
 
 AT_ONCE = 32  # steps between two looks at Ctrl-C
 UNSOLVED, UNDEFINED = 1, 2  # what ended a march

@@ -9,7 +9,7 @@ from numba import njit
 
 from integrators.coefficients import legendre
 from integrators.extended.arithmetic import Numbers, compiled, plus, times
-from problems import emit
+from problems import targets
 from problems.double_double import DD
 from problems.systems.base import System
 
@@ -44,7 +44,7 @@ def _numbers(table: Any) -> Numbers:
 
 def field_of(system: System) -> tuple[str, Any]:
     """Return a digest of a system's field, and the field for numbers: ``field(t, y, par, out)``."""
-    source = emit.source(system, "field", "numba", limit=0)
+    source = targets.source(system, "field", "numba", limit=0)
     key = hashlib.sha256(source.text.encode()).hexdigest()
     if key not in _fields:
         _fields[key] = compiled(source.text, source.name)

@@ -19,7 +19,7 @@ from integrators.kernel.native import machine
 from integrators.kernel.native.field import assembly
 from integrators.kernel.program import HBVMProgram
 from integrators.kernel.routes import WIDE
-from problems import emit
+from problems import targets
 from problems.problem import Problem
 
 NAMES = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
@@ -112,7 +112,7 @@ def _say(problem: Problem, k: int, s: int, h: float) -> None:
     program = HBVMProgram(problem.system, k=k, s=s, h=h)
     shape, constants = program.shape, program.constants
     quantity = "force" if program.second else "field"
-    counts = operations(emit.source(problem.system, quantity, "numba").text)
+    counts = operations(targets.source(problem.system, quantity, "numba").text)
     lanes = constants.lanes * -(-k // constants.lanes)
     plain = sum(n for name, n in counts.items() if name in "+-*")
     others = ", ".join(f"{lanes * n} {name}" for name, n in sorted(counts.items()) if name not in "+-*")

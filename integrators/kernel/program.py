@@ -48,13 +48,13 @@ from integrators.kernel.tangent.lanes import VectorLanes
 from integrators.kernel.varying import AdaptiveStepper
 from integrators.protocol import Array, Compiled, sampling_named
 from integrators.refusals import check_parameters, check_start, check_state
-from problems import emit
+from problems import targets
 from problems.analysis.sides import sides
 from problems.analysis.structure import depends_on_time
 from problems.analysis.switches import Switches
-from problems.emit.time_scale import time_scale
 from problems.errors import InputError
 from problems.problem import Problem, System
+from problems.targets.time_scale import time_scale
 
 MARGIN = 0.9
 """Part of the length allowed that steps aim at, besides `integrators.kernel.step.control.SAFETY`.
@@ -181,7 +181,7 @@ class HBVMProgram(Compiled):
             self.implicit()
         self.compile_seconds = binary.clock() - started
 
-    def _iterations(self, quantity: emit.Quantity, rows: int, lanes: int) -> binary.Native | None:
+    def _iterations(self, quantity: targets.Quantity, rows: int, lanes: int) -> binary.Native | None:
         """Return whole iterations for a system with a few rows, if they can be compiled with its field."""
         if rows > fused.ROWS or self.constants.route not in (8, 16) or not self.lanes:
             return None
@@ -464,7 +464,7 @@ class HBVMProgram(Compiled):
         """Q' = velocity * p, of unit momenta; shape (dof,), empty in first-order form."""
         if not self.second:
             return np.ones(0)
-        return emit.numpy(self.system, "velocity_scale")(0.0, np.zeros(self.system.dim), par)
+        return targets.numpy(self.system, "velocity_scale")(0.0, np.zeros(self.system.dim), par)
 
     def _velocity(self, par: Array) -> tuple[Array, Array, Array]:
         """Return `_velocity_scale`, and `Blocks.speed` and `Blocks.mass` of blocks."""
@@ -731,7 +731,7 @@ class ReversibleProgram(AdaptiveProgram):
         ahead = self._ordinary.start(y, par, t0).take(SCOUTED)
         states = np.concatenate([y[np.newaxis], ahead.y]).T
         times = np.append(t0, ahead.t)
-        rate = emit.numpy(self.system, self._scale)
+        rate = targets.numpy(self.system, self._scale)
         bare = rate(t0, states, np.append(par, 0.0))[0]
         order = np.argsort(bare)
         elapsed = np.cumsum(np.abs(np.gradient(times))[order])

@@ -15,9 +15,9 @@ from dataclasses import dataclass
 
 from problems.analysis.structure import degree
 from problems.analysis.switches import depends_on_time_between_switches
-from problems.calculus.function import Function
+from problems.derive.function import Function
+from problems.graph.nodes import STATE, T, reachable
 from problems.systems.base import System
-from problems.trace.graph import STATE, T, reachable
 
 NARROW, WIDE = 8, 16
 """Vector widths: numbers of stages at which the field is evaluated together; fewer cost as much."""

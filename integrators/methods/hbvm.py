@@ -8,8 +8,8 @@ from integrators.methods.automatic import ACCURATE_IN_LANES, WIDE, choose, choos
 from integrators.options import Absolute, Breakpoints, Count, Stages, Step, Tolerance
 from integrators.protocol import MethodBase, Program
 from problems.errors import InputError
+from problems.graph.nodes import T
 from problems.problem import Problem, System
-from problems.trace.graph import T
 
 CITATION = """\
 @book{BrugnanoIavernaro2016,

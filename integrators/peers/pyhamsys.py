@@ -126,9 +126,9 @@ def maps(system: System, type: str) -> tuple[Any, Any]:  # noqa: A002
     last = type in KICK_LAST
     import numba
 
-    from problems import emit
+    from problems import targets
 
-    force, scale, n = emit.numba(system, "force"), emit.numba(system, "velocity_scale"), system.dof or 0
+    force, scale, n = targets.numba(system, "force"), targets.numba(system, "velocity_scale"), system.dof or 0
 
     @numba.njit(error_model="numpy")
     def kick_drift(h: float, t: float, y: Array, par: Array) -> Array:

@@ -78,15 +78,15 @@ class CVODEProgram(ProgramBase):
     def __init__(self, system: System, method: MethodBase):
         super().__init__(system, method)
         self._solver = load("scikit-sundae", "sksundae.cvode").CVODE
-        from problems import emit
+        from problems import targets
 
         started = perf_counter()
-        self.field = emit.numba(system, "field")
+        self.field = targets.numba(system, "field")
         # The first call compiles for these types.
         self.field(0.0, np.ones(system.dim), system.pack({}), np.empty(system.dim))
         self.jacobian = system.jacobian()
         if self.jacobian is not None:
-            self.entries = emit.numba(system, self.jacobian)
+            self.entries = targets.numba(system, self.jacobian)
             self.entries(0.0, np.ones(system.dim), system.pack({}), np.empty(self.jacobian.rows.size))
         self.from_cache = None
         self.compile_seconds = perf_counter() - started

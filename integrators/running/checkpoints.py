@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from problems import emit
+from problems import targets
 from problems.errors import InputError
 from problems.problem import System
 
@@ -30,7 +30,7 @@ class Identity:
     @classmethod
     def from_system(cls, method: str, system: System, par: Any) -> "Identity":
         """Return that of a system with parameters, an array, integrated by a method."""
-        return cls(method, emit.fingerprint(system), system.name, par.tobytes())
+        return cls(method, targets.fingerprint(system), system.name, par.tobytes())
 
     def check(self, checkpoint: Any, kind: type) -> None:
         """Refuse what is no checkpoint of class ``kind``, or not one of this identity.

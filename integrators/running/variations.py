@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from integrators.protocol import Array, MethodBase, Variations, offers
-from problems import emit
+from problems import targets
 from problems.errors import InputError, shown, unknown
 from problems.problem import Problem, System
 from problems.quantities import plain_numbers
@@ -111,7 +111,7 @@ def _vectors(system: System, wanted: Any, *count: int) -> Array:
 
 def _slope(problem: Problem, y0: Array, par: Array) -> Array:
     """Return the field at the start, shape (dim,)."""
-    return emit.numpy(problem.system, "field")(problem.t0, y0, par)
+    return targets.numpy(problem.system, "field")(problem.t0, y0, par)
 
 
 def places(problem: Problem) -> dict[str, slice]:

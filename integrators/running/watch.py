@@ -18,7 +18,7 @@ import numpy as np
 
 from integrators.protocol import Array, MethodBase, Stats
 from integrators.solution import write_whole
-from problems import deprecated, emit
+from problems import deprecated, targets
 from problems.errors import InputError, shown
 from problems.problem import Problem
 from problems.systems.code_digest import code_digest
@@ -155,7 +155,7 @@ def identity(
     start = np.concatenate([[problem.t0], problem.y0 if begin is None else begin.ravel()])
     return {
         "problem": problem.written(),
-        "system": emit.fingerprint(problem.system),
+        "system": targets.fingerprint(problem.system),
         "start": hashlib.sha256(start.tobytes()).hexdigest(),
         "parameters": hashlib.sha256(problem.par.tobytes()).hexdigest(),
         "method": repr(method),

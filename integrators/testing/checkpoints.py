@@ -8,7 +8,7 @@ import numpy as np
 from integrators.protocol import Checkpoints, MethodBase, offers
 from integrators.testing.exercises import blow_up, pendulum, two_bodies
 from integrators.testing.rules import finished, irregular, raises, require, start
-from problems import Problem, emit
+from problems import Problem, targets
 from problems.errors import InputError
 
 NONE = "it has no checkpoints"
@@ -58,7 +58,7 @@ def refuses_other_checkpoints(method: MethodBase, problem: Problem) -> str | Non
                 others[f"that of {changed!r}"] = start(changed, problem).checkpoint()
                 break
     for other in (pendulum(), two_bodies(), blow_up()):
-        same = emit.fingerprint(other.system) == emit.fingerprint(problem.system)
+        same = targets.fingerprint(other.system) == targets.fingerprint(problem.system)
         if not same and method.accepts(other) is None:
             others[f"that of {other.system.name}"] = start(method, other).checkpoint()
     if problem.par.size:

@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from problems.analysis.invariants import Array, along, as_states
 from problems.analysis.sizes import with_sizes
-from problems.calculus.function import Function
+from problems.derive.function import Function
 from problems.double_double import DD
+from problems.graph.nodes import reachable
 from problems.systems.base import System
-from problems.trace.graph import reachable
 
 _SMALLEST, _LARGEST = 1e-270, 1e290  # sizes between which pairs of doubles have their 32 digits
 _TINY = 1e-60  # a product of four states that are as large is not below the smallest double

@@ -6,13 +6,13 @@ The result is rounded once, so that what is left is the integrator's error.
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from problems.calculus.function import Function
+from problems.derive.function import Function
 from problems.double_double import DD
 from problems.errors import InputError, shown
 from problems.evaluate.pairs import evaluate
+from problems.graph.nodes import T
 from problems.systems.base import System
 from problems.systems.lagrangian import Lagrangian
-from problems.trace.graph import T
 
 Array = NDArray[np.float64]
 

@@ -4,10 +4,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from problems.analysis.ranges import RANGES, Range
-from problems.calculus.forward import Slopes
+from problems.derive.forward import Slopes
 from problems.evaluate.evaluator import Evaluator
-from problems.trace.fold import Copy
-from problems.trace.graph import Graph, Node, T, reachable
+from problems.graph.fold import Copy
+from problems.graph.nodes import Graph, Node, T, reachable
 
 Array = NDArray[np.float64]
 
@@ -97,7 +97,9 @@ class TimeFunction:
         change = (value(a, side) > 0.0) != (value(b, side) > 0.0)
         if not change.any():
             return np.empty(0)
-        from scipy.optimize.elementwise import find_root  # few conditions need it, every process would load it
+        from scipy.optimize.elementwise import (
+            find_root,  # few conditions need it, every process would load it
+        )
 
         tolerances = {"xrtol": 2.0**-52, "xatol": 0.0, "fatol": 0.0, "frtol": 0.0}
         bracket = a[change], b[change]

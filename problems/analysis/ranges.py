@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from problems.evaluate.evaluator import Numbers
-from problems.trace.functions import FUNCTIONS
-from problems.trace.graph import Table
+from problems.graph.functions import FUNCTIONS
+from problems.graph.nodes import Table
 
 Array = NDArray[np.float64]
 

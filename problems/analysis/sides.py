@@ -4,8 +4,8 @@ from dataclasses import replace
 from math import pi
 
 from problems.analysis.structure import WITHOUT_END, has_kink
-from problems.calculus.function import Function, Term
-from problems.trace.graph import STATE, Node, Table, reachable
+from problems.derive.function import Function, Term
+from problems.graph.nodes import STATE, Node, Table, reachable
 
 GOLDEN = (5.0**0.5 - 1.0) / 2.0  # multiples of it are far from equal sums
 

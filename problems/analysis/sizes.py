@@ -7,8 +7,8 @@ horizontal, or of a parabolic orbit. What rounding makes of it is a part of the 
 from collections.abc import Iterable
 from weakref import WeakKeyDictionary
 
-from problems.calculus.function import Function, Loops, LoopTerm, Term, stacked
-from problems.trace.graph import STATE, Node
+from problems.derive.function import Function, Loops, LoopTerm, Term, stacked
+from problems.graph.nodes import STATE, Node
 
 _known: WeakKeyDictionary[Function, Function] = WeakKeyDictionary()
 
@@ -46,7 +46,7 @@ def with_sizes(function: Function) -> Function:
 class _Sizes:
     """The sums of absolute terms of nodes; ``None`` for those that have no terms.
 
-    No `problems.trace.fold.Fold`, which visits every node: what is inside a term is none of its business.
+    No `problems.graph.fold.Fold`, which visits every node: what is inside a term is none of its business.
     """
 
     def __init__(self, roots: Iterable[Node]) -> None:

@@ -4,10 +4,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from problems.errors import InputError
+from problems.graph.fold import Fold
+from problems.graph.functions import FUNCTIONS
+from problems.graph.nodes import STATE, Node, T, reachable
 from problems.systems.base import System
-from problems.trace.fold import Fold
-from problems.trace.functions import FUNCTIONS
-from problems.trace.graph import STATE, Node, T, reachable
 
 WITHOUT_END = ("round", "floor")
 """Functions that jump again and again, at places that no list can hold."""

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from problems.analysis.isolation import MOST, TimeFunction, TooMany
 from problems.analysis.structure import WITHOUT_END, has_kink
 from problems.evaluate.doubles import DOUBLES
+from problems.graph.fold import Fold
+from problems.graph.nodes import PAR, STATE, Affine, Node, T, reachable
 from problems.systems.base import System
-from problems.trace.fold import Fold
-from problems.trace.graph import PAR, STATE, Affine, Node, T, reachable
 
 Pieces = list[tuple[Any, Any]]
 """What a node may be as a function of time: slope and offset of each of its affine pieces.

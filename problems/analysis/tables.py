@@ -4,11 +4,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from problems.analysis.switches import affine_pieces
-from problems.calculus.function import function_of
+from problems.derive.function import function_of
 from problems.errors import InputError
 from problems.evaluate.pairs import evaluate
+from problems.graph.nodes import STATE, T, reachable
 from problems.systems.base import System
-from problems.trace.graph import STATE, T, reachable
 
 _ROUNDING = 2.0**-48  # of the largest knot: so far an argument that is calculated may be beyond the last one
 

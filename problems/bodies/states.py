@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from problems import emit
+from problems import targets
 from problems.bodies.orbits import (
     BARYCENTRIC,
     JACOBI,
@@ -73,7 +73,7 @@ def bodies_of(
         raise InputError(f"y={shown(y)} must be a state of {system.name}, {system.dim} numbers, all finite.")
     half, v = 3 * n, state[3 * n :]
     if system.dof is not None:
-        v = emit.numpy(system, "field")(problem.t0 if t is None else t, state, problem.par)[:half]
+        v = targets.numpy(system, "field")(problem.t0 if t is None else t, state, problem.par)[:half]
     return masses, state[:half].reshape(n, 3).copy(), v.reshape(n, 3).copy()
 
 
@@ -212,7 +212,7 @@ def elements(
     if system.velocity_scale is not None:
         v = v / np.repeat(masses, 3)
     elif system.dof is not None:
-        field = emit.numpy(system, "field")
+        field = targets.numpy(system, "field")
         rows = zip(times.ravel(), states.reshape(-1, system.dim), strict=True)
         v = np.array([field(at, row, problem.par)[: 3 * n] for at, row in rows]).reshape(q.shape)
     apart, speed = (-(weights @ part.reshape(*part.shape[:-1], n, 3)) for part in (q, v))
@@ -271,7 +271,7 @@ def weights_of(about: int | str, mu: Array, body: int) -> tuple[Array, float]:
 
 def momenta_of(system: System, t: float, q: Array, v: Array, masses: Array) -> Array:
     """Return the momenta with which bodies have these velocities: p + m (v - dH/dp) until it stays."""
-    field, weights = emit.numpy(system, "field"), np.repeat(masses, 3)
+    field, weights = targets.numpy(system, "field"), np.repeat(masses, 3)
     wanted, par = v.reshape(-1), system.pack()
     p = weights * wanted
     for _ in range(SWEEPS):

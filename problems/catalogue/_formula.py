@@ -16,7 +16,7 @@ from collections.abc import Callable
 from typing import Any, NoReturn
 
 from problems.errors import InputError, unknown
-from problems.trace.functions import FUNCTIONS, OF_ONE_ARGUMENT
+from problems.graph.functions import FUNCTIONS, OF_ONE_ARGUMENT
 
 LONGEST = 4000  # characters
 DEEPEST = 60  # nesting of parentheses, functions and signs

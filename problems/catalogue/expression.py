@@ -13,10 +13,10 @@ from problems.catalogue._formula import COORDINATE, NAME, Formula
 from problems.checks import Must
 from problems.entry import Expected, entry
 from problems.errors import InputError, shown, unknown
+from problems.graph.functions import OF_ONE_ARGUMENT
 from problems.picture import Phase
 from problems.problem import Problem
 from problems.systems.hamiltonian import Hamiltonian
-from problems.trace.functions import OF_ONE_ARGUMENT
 
 MOST_FREEDOM = 100  # degrees of freedom; larger systems have sums, which text has not
 

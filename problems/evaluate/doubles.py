@@ -5,8 +5,8 @@ from collections.abc import Callable
 import numpy as np
 
 from problems.evaluate.evaluator import Array, Numbers
-from problems.trace.arithmetic import ARITHMETIC
-from problems.trace.functions import FUNCTIONS
+from problems.graph.arithmetic import ARITHMETIC
+from problems.graph.functions import FUNCTIONS
 
 
 def _guarded(function: Callable[..., float]) -> Callable[..., Array]:

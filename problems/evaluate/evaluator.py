@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from problems.calculus.function import Function
-from problems.trace.fold import Fold
-from problems.trace.graph import Node, reachable
-from problems.trace.loops import Affine, Loop, Stage
+from problems.derive.function import Function
+from problems.graph.fold import Fold
+from problems.graph.loops import Affine, Loop, Stage
+from problems.graph.nodes import Node, reachable
 
 Array = NDArray[np.float64]
 

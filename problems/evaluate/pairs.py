@@ -6,12 +6,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from problems import double_double
-from problems.calculus.function import Function
+from problems.derive.function import Function
 from problems.double_double import DD, as_dd
 from problems.evaluate.evaluator import Array, Evaluator, Numbers
-from problems.trace.arithmetic import ARITHMETIC
-from problems.trace.functions import FUNCTIONS
-from problems.trace.graph import reachable
+from problems.graph.arithmetic import ARITHMETIC
+from problems.graph.functions import FUNCTIONS
+from problems.graph.nodes import reachable
 
 # Numbers held at once by a declared sum's terms, so that many states and many terms fit in memory.
 _BLOCK = 2_000_000

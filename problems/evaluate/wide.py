@@ -14,10 +14,10 @@ import mpmath
 import numpy as np
 from numpy.typing import NDArray
 
-from problems.calculus.function import Function
+from problems.derive.function import Function
 from problems.evaluate.evaluator import Evaluator, Numbers
-from problems.trace.arithmetic import ARITHMETIC
-from problems.trace.functions import FUNCTIONS
+from problems.graph.arithmetic import ARITHMETIC
+from problems.graph.functions import FUNCTIONS
 
 _DIGITS = 36
 _WIDE = mpmath.MPContext()  # of its own: the precision of mpmath.mp belongs to the user

@@ -11,18 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from problems import limits
-from problems.calculus.forward import forward
-from problems.calculus.function import Function, function_of, stacked
-from problems.calculus.gradient import gradient
-from problems.calculus.jacobian import Jacobian, jacobian
-from problems.calculus.reverse import Variables, reverse
 from problems.checks import NOTHING, Named, checked, number, numbers
+from problems.derive.forward import forward
+from problems.derive.function import Function, function_of, stacked
+from problems.derive.gradient import gradient
+from problems.derive.jacobian import Jacobian, jacobian
+from problems.derive.reverse import Variables, reverse
 from problems.errors import InputError, shown, unknown
+from problems.graph import arguments
+from problems.graph.nodes import Graph, Node, T
+from problems.graph.packed import packed, unpacked
 from problems.quantities import refuse_more_than_numbers
 from problems.systems.stored import check_system
-from problems.trace import arguments
-from problems.trace.graph import Graph, Node, T
-from problems.trace.packed import packed, unpacked
 
 Value = float | Sequence[Any]
 _NAMED = ("field", "hamiltonian", "force", "velocity_scale")
@@ -456,7 +456,7 @@ class System:
     def tangent(
         self, name: str, directions: int, *, parameters: bool = False, beside: bool = False
     ) -> Function:
-        """Return the derivatives of a function along directions; see `problems.calculus.forward`.
+        """Return the derivatives of a function along directions; see `problems.derive.forward`.
 
         Parameters
         ----------
@@ -485,7 +485,7 @@ class System:
         return self._tangents[key]
 
     def product(self, variables: Variables) -> Function:
-        """Return the products of weights with the field's derivatives; see `problems.calculus.reverse`.
+        """Return the products of weights with the field's derivatives; see `problems.derive.reverse`.
 
         Parameters
         ----------

@@ -4,12 +4,12 @@ from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Annotated, Any
 
-from problems.calculus.function import Function, LoopTerm, Term, joined, stacked
-from problems.calculus.gradient import gradient
 from problems.checks import NOTHING, Named, at_least, checked_arguments
+from problems.derive.function import Function, LoopTerm, Term, joined, stacked
+from problems.derive.gradient import gradient
 from problems.errors import InputError, shown, unknown
+from problems.graph.nodes import PAR, Loop, Node, P
 from problems.systems.base import Bodies, System, Value
-from problems.trace.graph import PAR, Loop, Node, P
 
 
 class Hamiltonian(System):

@@ -4,16 +4,16 @@ from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Annotated, Any
 
-from problems.calculus.function import Function
-from problems.calculus.gradient import gradient
 from problems.checks import NOTHING, Named, at_least, checked_arguments
+from problems.derive.function import Function
+from problems.derive.gradient import gradient
 from problems.errors import InputError
+from problems.graph import arguments
+from problems.graph.fold import Copy
+from problems.graph.nodes import Node, P
+from problems.graph.source_line import line_of_function
 from problems.systems.base import System, Value
 from problems.systems.hamiltonian import Hamiltonian
-from problems.trace import arguments
-from problems.trace.fold import Copy
-from problems.trace.graph import Node, P
-from problems.trace.source_line import line_of_function
 
 
 class Lagrangian(Hamiltonian):

@@ -8,8 +8,8 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from problems.calculus.function import Function
 from problems.checks import NOTHING, Named, at_least, checked_arguments
+from problems.derive.function import Function
 from problems.errors import InputError, shown
 from problems.quantities import plain_numbers
 from problems.systems.base import System, Value

@@ -3,15 +3,15 @@
 from collections.abc import Callable
 from typing import Annotated, Any
 
-from problems.calculus.function import Function
-from problems.calculus.gradient import gradient
-from problems.calculus.opposite import opposite
 from problems.checks import NOTHING, Named, at_least, checked_arguments
+from problems.derive.function import Function
+from problems.derive.gradient import gradient
+from problems.derive.opposite import opposite
 from problems.errors import InputError
+from problems.graph import arguments
+from problems.graph.nodes import Node
+from problems.graph.source_line import line_of_function
 from problems.systems.base import System, Value
-from problems.trace import arguments
-from problems.trace.graph import Node
-from problems.trace.source_line import line_of_function
 
 
 class Poisson(System):

@@ -1,11 +1,11 @@
-"""Systems as files hold them, checked as `problems.trace.stored` checks their graphs."""
+"""Systems as files hold them, checked as `problems.graph.stored` checks their graphs."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any
 
 from problems import limits
 from problems.errors import shown
-from problems.trace.stored import Shape, StoredGraph, integer, items, refuse
+from problems.graph.stored import Shape, StoredGraph, integer, items, refuse
 
 _PARTS = {
     "name", "dim", "dof", "parameters", "invariants", "guards", "vectors", "bodies", "graph", "functions",

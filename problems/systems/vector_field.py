@@ -3,13 +3,13 @@
 from collections.abc import Callable
 from typing import Annotated, Any
 
-from problems.calculus.function import Function, Loops, LoopTerm, Term, joined
 from problems.checks import NOTHING, Named, at_least, checked_arguments
+from problems.derive.function import Function, Loops, LoopTerm, Term, joined
 from problems.errors import InputError
+from problems.graph import arguments
+from problems.graph.each import Each, components, length
+from problems.graph.source_line import line_of_function
 from problems.systems.base import System, Value
-from problems.trace import arguments
-from problems.trace.each import Each, components, length
-from problems.trace.source_line import line_of_function
 
 
 class VectorField(System):

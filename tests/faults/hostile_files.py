@@ -18,7 +18,7 @@ import numpy as np
 import problems
 from integrators import HBVM, Gauss, integrate, load
 from integrators.solution import Solution
-from problems import Hamiltonian, InputError, Lagrangian, Poisson, Problem, VectorField, emit
+from problems import Hamiltonian, InputError, Lagrangian, Poisson, Problem, VectorField, targets
 from problems.systems.base import Bodies, System
 
 KNOTS, VALUES = [-2.0, -1.0, 0.3, 1.0, 2.0], [0.0, 1.0, -0.5, 0.2, 0.7]
@@ -152,8 +152,8 @@ class _Numpy:
 
 def guarded(system: System, what: Any, par: np.ndarray) -> None:
     """Run what would be compiled, with every index checked."""
-    for limit in (0, emit.SMALL):
-        made = emit.source(system, what, "numba", limit=limit)
+    for limit in (0, targets.SMALL):
+        made = targets.source(system, what, "numba", limit=limit)
         namespace: dict[str, Any] = {"np": _Numpy, **{name: getattr(math, name) for name in dir(math)}}
         exec(made.text, namespace)  # noqa: S102 -- the text under test
         n = len(getattr(what, "function", what).outputs)

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from integrators.kernel.native import binary, store
-from problems.emit import cache
+from problems.targets import cache
 
 from .fault import Fault, is_met
 

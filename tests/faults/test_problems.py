@@ -216,7 +216,7 @@ Hamiltonian(lambda q, p, m: m.sum(3, range(2)), dof=2)       | the first argumen
 Hamiltonian(lambda q, p, m: m.sum(lambda i: p[i]**2, range(3)), dof=2) | p[2] does not exist; p has the
 Hamiltonian(lambda q, p, m: m.sum(lambda i, j: p[i]**2, range(2)), dof=2) | H failed with TypeError:
 Hamiltonian(lambda q, p, m: m.sum(lambda i: p[i]**2, [huge]), dof=2) | the index of m.sum is not a list of
-emit.numba(Hamiltonian(lambda q, p, m: p[0]**2/2 + horner(q[0], 900), dof=1), 'field') | HBVM_BENCH_MAX_DEPTH
+targets.numba(Hamiltonian(lambda q, p, m: p[0]**2 + horner(q[0], 900), dof=1), 'field') | HBVM_BENCH_MAX_DEPTH
 Hamiltonian(lambda q, p, m: deep(q[0], 5000, m), dof=1)      | H failed with RecursionError: maximum
 Hamiltonian(3, dof=1)                                        | H must be a function, not 3
 Hamiltonian(None, dof=1)                                     | H must be a function, not None
@@ -386,7 +386,7 @@ Problem(V2, y0=[0, 1], t_end=huge)                           | t_end=about 1e400
 Problem(V2, y0=[0, 1], t_end=[1, 2])                         | t_end=[1, 2] of Problem must be a finite
 Problem(V2, y0=[0, 1], t_end='1')                            | t_end='1' of Problem must be a finite number
 Problem(V2, y0=[0, 1], t_end=1., references=[1])             | references=[1] of Problem must be a list of
-emit.numba(P1, 'field')                                      | a system is needed, such as problem.system
+targets.numba(P1, 'field')                                      | a system is needed, such as problem.system
 Hamiltonian(osc, dof=1, parameters={'m': [1]}, bodies=Bodies()) | does not fit dof=1 and m=(1.0,)
 Problem(V2, y0=[0, 1], t_end=1j)                             | t_end=1j of Problem is complex, and must be
 Problem(V2, y0=[0, 1], t0='a', t_end=1.)                     | t0='a' of Problem must be a finite number

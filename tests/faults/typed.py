@@ -10,7 +10,7 @@ import numpy as np
 import integrators
 import problems
 from integrators import HBVM, Event, integrate, integrate_many, registry, section
-from problems import Bodies, Hamiltonian, Opaque, Poisson, Problem, VectorField, emit, load
+from problems import Bodies, Hamiltonian, Opaque, Poisson, Problem, VectorField, load, targets
 
 from .fault import Fault
 
@@ -46,7 +46,7 @@ def names() -> dict[str, Any]:
         "integrators": integrators,
         "problems": problems,
         "registry": registry,
-        "emit": emit,
+        "targets": targets,
         "Event": Event,
         "integrate": integrate,
         "integrate_many": integrate_many,

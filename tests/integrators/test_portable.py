@@ -12,7 +12,7 @@ from pathlib import Path
 import problems, integrators
 
 assert not hasattr(os, "fork")
-from problems.emit.cache import locked
+from problems.targets.cache import locked
 from integrators import HBVM, Gauss, integrate
 
 def energy(q, p, m):

@@ -22,7 +22,7 @@ from integrators import (
     integrate,
     load,
 )
-from problems import Hamiltonian, InputError, Opaque, Poisson, Problem, VectorField, emit
+from problems import Hamiltonian, InputError, Opaque, Poisson, Problem, VectorField, targets
 from problems.errors import MissingLibraryError
 
 METHODS = [
@@ -43,7 +43,7 @@ def made(problem: Problem) -> dict[str, bytes]:
     """Return what another process makes of a problem."""
     solution = integrate(problem, HBVM(k=6, s=3, h=0.1), times=[0.0, 1.0])
     return {
-        "field": emit.source(problem.system, "field", "numba").text.encode(),
+        "field": targets.source(problem.system, "field", "numba").text.encode(),
         "y": solution.y.tobytes(),
         "errors": pickle.dumps({name: e.tolist() for name, e in problem.errors(solution.y).items()}),
         "print": repr(problem).encode(),
@@ -208,7 +208,9 @@ class TestPickles:
         assert not again.y0.flags.writeable
         for mine, its in zip(problem.system.functions, again.system.functions, strict=True):
             for backend in ("numba", "numpy"):
-                assert emit.source(again.system, its, backend) == emit.source(problem.system, mine, backend)
+                assert targets.source(again.system, its, backend) == targets.source(
+                    problem.system, mine, backend
+                )
 
     def test_foreign_code_by_its_name(self):
         problem = Problem(Opaque(_field, dim=2, parameters={"a": 1.0}), y0=[1.0, 0.0], t_end=1.0)

@@ -8,7 +8,7 @@ import pytest
 
 from integrators import Status, integrate, testing
 from integrators.stepping import FixedStep, FixedStepper
-from problems import Opaque, Problem, VectorField, emit
+from problems import Opaque, Problem, VectorField, targets
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -19,7 +19,7 @@ class RK4(FixedStep):
     library, family, citation = "tests", "runge-kutta", "W. Kutta (1901)"
 
     def march(self, system):
-        f, dim = emit.numba(system, "field"), system.dim
+        f, dim = targets.numba(system, "field"), system.dim
 
         @numba.njit(error_model="numpy")
         def march(t, h, first, n, y, par):

@@ -16,12 +16,13 @@ from scipy.special import erf, erfc
 
 import problems
 from integrators import DOP853, HBVM, Gauss, Taylor, integrate, integrate_many
-from problems import Hamiltonian, InputError, Problem, VectorField, emit
-from problems.analysis import latex, structure
+from problems import Hamiltonian, InputError, Problem, VectorField, targets
+from problems.analysis import structure
 from problems.analysis.switches import Switches
 from problems.double_double import DD
-from problems.trace.arguments import OTHERS
-from problems.trace.functions import FUNCTIONS
+from problems.graph.arguments import OTHERS
+from problems.graph.functions import FUNCTIONS
+from problems.targets import latex
 
 KNOTS = [-2.0, -1.1, -0.3, 0.5, 1.0, 2.0]
 POINTS = [0.3, -1.0, 0.7, 0.1, 0.9, -0.4]
@@ -87,13 +88,13 @@ class TestEveryEngine:
     def test_values(self, name):
         y = states()
         wanted = (y[2] ** 2 + y[3] ** 2) / 2 + FORMULAS[name][1](y[0], y[1])
-        found = emit.numpy(system_of(name), "hamiltonian")(0.0, y, np.empty(0))[0]
+        found = targets.numpy(system_of(name), "hamiltonian")(0.0, y, np.empty(0))[0]
         # Measured 6.7e-16.
         assert np.abs(found - wanted).max() < 2e-15
 
     def test_gradients_against_differences(self, name):
         y, h = states(), 1e-4
-        field = emit.numpy(system_of(name), "field")(0.0, y, np.empty(0))
+        field = targets.numpy(system_of(name), "field")(0.0, y, np.empty(0))
         for i in range(2):
             ends = []
             for far in (-2, -1, 1, 2):
@@ -110,8 +111,8 @@ class TestEveryEngine:
         jacobian = system.jacobian("force")
         y = states(1)[:, 0]
         full = np.zeros((2, 2))
-        full[jacobian.rows, jacobian.columns] = emit.numpy(system, jacobian)(0.0, y, np.empty(0))
-        force = emit.numpy(system, "force")
+        full[jacobian.rows, jacobian.columns] = targets.numpy(system, jacobian)(0.0, y, np.empty(0))
+        force = targets.numpy(system, "force")
         for i in range(2):
             e = h * np.eye(4)[i]
             at = [force(0.0, y + k * e, np.empty(0)) for k in (-2, -1, 1, 2)]
@@ -121,10 +122,10 @@ class TestEveryEngine:
     def test_the_engines_agree(self, name):
         system = system_of(name)
         y = states(20)
-        wanted = emit.numpy(system, "field")(0.0, y, np.empty(0))
+        wanted = targets.numpy(system, "field")(0.0, y, np.empty(0))
         size = np.abs(wanted).max()
         found = np.empty_like(wanted)
-        compiled, jax = emit.numba(system, "field"), emit.jax(system, "field")
+        compiled, jax = targets.numba(system, "field"), targets.jax(system, "field")
         for i in range(y.shape[1]):
             out = np.empty(4)
             compiled(0.0, y[:, i].copy(), np.empty(0), out)
@@ -138,13 +139,13 @@ class TestEveryEngine:
         hy = pytest.importorskip("heyoka")
         if name == "table" or (name in FUNCTIONS and FUNCTIONS[name].heyoka is None):
             with pytest.raises(InputError, match=rf"m\.{name}"):
-                emit.heyoka(system_of(name))
+                targets.heyoka(system_of(name))
             return
-        pairs = emit.heyoka(system_of(name))
+        pairs = targets.heyoka(system_of(name))
         variables, slopes = zip(*pairs, strict=True)
         y = states(20)
         found = hy.cfunc(list(slopes), vars=list(variables))(np.ascontiguousarray(y))
-        wanted = emit.numpy(system_of(name), "field")(0.0, y, np.empty(0))
+        wanted = targets.numpy(system_of(name), "field")(0.0, y, np.empty(0))
         # Measured 2.8e-16.
         assert np.abs(found - wanted).max() < 2e-15 * np.abs(wanted).max()
 
@@ -152,11 +153,11 @@ class TestEveryEngine:
         formula, plain = FORMULAS[name]
         system = Hamiltonian(lambda q, m: m.sum(lambda i: formula(q[i], q[i + 1], m), range(200)), dof=201)
         y = np.random.default_rng(3).uniform(-0.95, 0.95, 402)
-        assert emit.numpy(system, "hamiltonian")(0.0, y, np.empty(0))[0] == pytest.approx(
+        assert targets.numpy(system, "hamiltonian")(0.0, y, np.empty(0))[0] == pytest.approx(
             plain(y[:200], y[1:201]).sum(), rel=1e-13
         )
-        out, wanted = np.empty(402), emit.numpy(system, "field")(0.0, y, np.empty(0))
-        emit.numba(system, "field")(0.0, y, np.empty(0), out)
+        out, wanted = np.empty(402), targets.numpy(system, "field")(0.0, y, np.empty(0))
+        targets.numba(system, "field")(0.0, y, np.empty(0), out)
         assert np.abs(out - wanted).max() < 1e-14 * np.abs(wanted).max()
 
     def test_a_trajectory_keeps_its_energy(self, name):
@@ -171,7 +172,7 @@ class TestEveryEngine:
     def test_pickle_and_formula(self, name):
         system = system_of(name)
         again = pickle.loads(pickle.dumps(system))
-        assert emit.source(again, "field", "numba") == emit.source(system, "field", "numba")
+        assert targets.source(again, "field", "numba") == targets.source(system, "field", "numba")
         assert latex.latex(system)
 
 
@@ -196,8 +197,8 @@ class TestTheTable:
         ones, system, y = table
         wanted = np.array([[f.value(x) for x in row] for f, row in zip(ones, y.tolist(), strict=True)])
         size = np.maximum(np.abs(wanted), 1e-3)
-        found = {"numpy": emit.numpy(system, "field")(0.0, y, np.empty(0))}
-        compiled, jax = emit.numba(system, "field"), emit.jax(system, "field")
+        found = {"numpy": targets.numpy(system, "field")(0.0, y, np.empty(0))}
+        compiled, jax = targets.numba(system, "field"), targets.jax(system, "field")
         found["numba"], found["jax"] = np.empty_like(y), np.empty_like(y)
         for i in range(y.shape[1]):
             out = np.empty(len(ones))
@@ -212,9 +213,9 @@ class TestTheTable:
     def test_heyoka_has_them(self, table):
         hy = pytest.importorskip("heyoka")
         ones, system, y = field_of([f for f in table[0] if f.heyoka is not None])
-        variables, values = zip(*emit.heyoka(system), strict=True)
+        variables, values = zip(*targets.heyoka(system), strict=True)
         found = hy.cfunc(list(values), vars=list(variables))(y)
-        wanted = emit.numpy(system, "field")(0.0, y, np.empty(0))
+        wanted = targets.numpy(system, "field")(0.0, y, np.empty(0))
         error = (np.abs(found - wanted) / np.maximum(np.abs(wanted), 1e-3)).max(axis=1)
         assert error.max() < 1e-15, ones[int(error.argmax())].name  # measured 2.2e-16
 
@@ -222,7 +223,7 @@ class TestTheTable:
         ones, system, y = field_of([f for f in table[0] if f.derivative is not None])
         jacobian = system.jacobian()
         assert jacobian.rows.tolist() == jacobian.columns.tolist() == list(range(len(ones)))
-        found = emit.numpy(system, jacobian)(0.0, y, np.empty(0))
+        found = targets.numpy(system, jacobian)(0.0, y, np.empty(0))
         for f, row, slopes in zip(ones, y, found, strict=True):
             exact = {"abs": mpmath.fabs}.get(f.name) or getattr(mpmath, f.name)
             with mpmath.workdps(40):
@@ -248,10 +249,10 @@ class TestTheTable:
         system = VectorField(lambda y, m: [m.floor(y[0]), m.sign(y[0]), m.abs(y[0])], dim=3)
         y, wanted = np.array([x, 0.0, 0.0]), [math.floor(x), np.sign(x), abs(x)]
         out = np.empty(3)
-        emit.numba(system, "field")(0.0, y, np.empty(0), out)
+        targets.numba(system, "field")(0.0, y, np.empty(0), out)
         assert out.tolist() == wanted
-        assert emit.numpy(system, "field")(0.0, y, np.empty(0)).tolist() == wanted
-        assert emit.jax(system, "field")(0.0, y, np.empty(0)).tolist() == wanted
+        assert targets.numpy(system, "field")(0.0, y, np.empty(0)).tolist() == wanted
+        assert targets.jax(system, "field")(0.0, y, np.empty(0)).tolist() == wanted
         assert FUNCTIONS["floor"].value(x) == wanted[0]
         assert FUNCTIONS["sign"].value(x) == wanted[1]
 
@@ -349,7 +350,7 @@ class TestTables:
     def test_outside_the_outer_pieces_go_on_as_scipys(self):
         system = VectorField(lambda t, m: [m.table(t, KNOTS, POINTS)], dim=1)
         for t in (-3.0, -2.0, 0.5, 2.0, 2.5):
-            found = emit.numpy(system, "field")(t, np.zeros(1), np.empty(0))[0]
+            found = targets.numpy(system, "field")(t, np.zeros(1), np.empty(0))[0]
             assert found == pytest.approx(float(SPLINE(t)), rel=1e-13)
 
     @pytest.mark.parametrize("method", [HBVM(), Gauss(s=6, tol=1e-15)], ids=repr)
@@ -465,7 +466,7 @@ class TestWhere:
 
 def test_constants_and_domains():
     def value(formula):
-        return emit.numpy(VectorField(formula, dim=1), "field")(0.0, np.zeros(1), np.empty(0))[0]
+        return targets.numpy(VectorField(formula, dim=1), "field")(0.0, np.zeros(1), np.empty(0))[0]
 
     assert value(lambda m: [m.erf(0.5)]) == math.erf(0.5)
     assert value(lambda m: [m.atan2(1, -1)]) == math.atan2(1.0, -1.0)
@@ -510,9 +511,9 @@ def test_the_examples_of_the_page_are_true():
 )
 def test_python_operators_have_the_value_that_they_have_for_numbers(formula, plain):
     system = problems.VectorField(lambda y: [formula(y[0])], dim=1, name="operators")
-    field = emit.numpy(system, "field")
+    field = targets.numpy(system, "field")
     for x in (0.1, 0.65, 1.0, 3.2, 12.9):
         assert field(0.0, np.array([x]), system.pack())[0] == pytest.approx(plain(x), rel=4e-15, abs=4e-15)
-    slope = emit.numpy(system, system.tangent("field", 1))(0.0, np.array([1.0, 3.2]), system.pack())[0]
+    slope = targets.numpy(system, system.tangent("field", 1))(0.0, np.array([1.0, 3.2]), system.pack())[0]
     around = (plain(3.2 + 1e-6) - plain(3.2 - 1e-6)) / 2e-6
     assert slope == pytest.approx(around, rel=1e-8, abs=1e-8)  # measured 1e-9

@@ -11,9 +11,9 @@ import scipy.sparse
 from scipy.integrate import solve_ivp
 
 from integrators import HBVM, integrate
-from problems import Hamiltonian, InputError, Problem, System, VectorField, emit
+from problems import Hamiltonian, InputError, Problem, System, VectorField, targets
 from problems.analysis import invariants
-from problems.trace.loops import affine
+from problems.graph.loops import affine
 
 RNG = np.random.default_rng(3)
 N = 6
@@ -192,9 +192,9 @@ def y(case):
 @pytest.mark.parametrize("limit", [0, 700, None])
 def test_loops_have_the_value_of_the_same_formula_in_numpy(case, y, limit):
     system, par, expected = case.system, case.system.pack(), case.plain(y)
-    assert emit.numpy(system, "field", limit=limit)(0.0, y, par) == pytest.approx(expected, abs=1e-13)
+    assert targets.numpy(system, "field", limit=limit)(0.0, y, par) == pytest.approx(expected, abs=1e-13)
     namespace = {"np": np, "room": lambda like, n: np.empty(n), **{f: getattr(np, f) for f in FUNCTIONS}}
-    made = emit.source(system, "field", "numba", limit=limit)
+    made = targets.source(system, "field", "numba", limit=limit)
     exec(made.text, namespace)  # noqa: S102 -- emitted from a graph
     out = np.empty(system.dim)
     namespace[made.name](0.0, y, par, out)
@@ -212,13 +212,13 @@ def test_derivatives_of_loops_are_those_that_differences_give(case, y):
     by_differences = np.stack([(case.plain(y + e) - case.plain(y - e)) / 2e-6 for e in steps], axis=1)
     jacobian = system.jacobian()
     matrix = np.zeros((system.dim, system.dim))
-    matrix[jacobian.rows, jacobian.columns] = emit.numpy(system, jacobian, limit=0)(0.0, y, par)
+    matrix[jacobian.rows, jacobian.columns] = targets.numpy(system, jacobian, limit=0)(0.0, y, par)
     assert matrix == pytest.approx(by_differences, abs=1e-7)  # measured 5e-9
     along = RNG.normal(size=system.dim)
     state = np.concatenate([along, y])
-    tangent = emit.numpy(system, system.tangent("field", 1), limit=0)(0.0, state, par)
+    tangent = targets.numpy(system, system.tangent("field", 1), limit=0)(0.0, state, par)
     assert tangent == pytest.approx(matrix @ along, abs=1e-12)  # measured 1e-14
-    product = emit.numpy(system, system.product("state"), limit=0)(0.0, state, par)
+    product = targets.numpy(system, system.product("state"), limit=0)(0.0, state, par)
     assert product == pytest.approx(along @ matrix, abs=1e-12)  # measured 1e-14
 
 
@@ -230,18 +230,18 @@ def test_the_jacobian_has_the_entries_of_the_graph_only():
 
 def test_loops_are_unrolled_for_heyoka(case):
     pytest.importorskip("heyoka")
-    assert len(emit.heyoka(case.system)) == case.system.dim
+    assert len(targets.heyoka(case.system)) == case.system.dim
 
 
 def test_loops_run_in_jax(case, y):
     pytest.importorskip("jax")
-    value = emit.jax(case.system, "field", limit=0)(0.0, y, case.system.pack())
+    value = targets.jax(case.system, "field", limit=0)(0.0, y, case.system.pack())
     assert np.asarray(value) == pytest.approx(case.plain(y), abs=1e-13)
 
 
 def test_a_pickled_system_has_the_same_loops(case):
     again = pickle.loads(pickle.dumps(case.system))
-    assert emit.fingerprint(again) == emit.fingerprint(case.system)
+    assert targets.fingerprint(again) == targets.fingerprint(case.system)
 
 
 def test_the_code_does_not_grow_with_the_number_of_components():
@@ -253,7 +253,7 @@ def test_the_code_does_not_grow_with_the_number_of_components():
 
         return VectorField(f, dim=n)
 
-    small, large = (emit.source(network(n), "field", "numba") for n in (400, 2000))
+    small, large = (targets.source(network(n), "field", "numba") for n in (400, 2000))
     assert small.text.count("\n") == large.text.count("\n")
     assert small.cost == large.cost < 100  # measured 63
 
@@ -295,7 +295,7 @@ def test_many_small_sums_stay_loops_instead_of_being_unrolled():
     def f(y, m):
         return [m.sum(lambda j, i=i: m.sin(y[j] - y[i]), range(50)) for i in range(50)]
 
-    assert emit.source(VectorField(f, dim=50), "field", "numba").text.count("sin(") == 50
+    assert targets.source(VectorField(f, dim=50), "field", "numba").text.count("sin(") == 50
 
 
 @pytest.mark.parametrize(
@@ -361,7 +361,9 @@ def check_random(seed: int) -> None:
     y, par = np.random.default_rng(seed).normal(size=system.dim), system.pack()
 
     def both(function, state):
-        looped, unrolled = (emit.numpy(system, function, limit=limit)(0.0, state, par) for limit in (0, None))
+        looped, unrolled = (
+            targets.numpy(system, function, limit=limit)(0.0, state, par) for limit in (0, None)
+        )
         scale = 1.0 + np.abs(unrolled).max()
         assert looped == pytest.approx(unrolled, abs=1e-13 * scale)  # measured 2e-15
         return unrolled

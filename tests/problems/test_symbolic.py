@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from integrators import HBVM, integrate
-from problems import Hamiltonian, InputError, Problem, VectorField, emit, from_sympy
+from problems import Hamiltonian, InputError, Problem, VectorField, from_sympy, targets
 from problems.symbolic import solution
 
 sympy = pytest.importorskip("sympy")
@@ -46,7 +46,7 @@ def test_a_hamiltonian(expression, by_hand):
     made = from_sympy(expression, [q1, q2], [p1, p2], parameters={a: 1.7})
     known = Hamiltonian(by_hand, dof=2, parameters={"a": 1.7})
     y = np.random.default_rng(1).uniform(0.3, 1.5, (4, 50))
-    fields = [emit.numpy(system, "field")(np.full(50, 0.4), y, system.pack()) for system in (made, known)]
+    fields = [targets.numpy(system, "field")(np.full(50, 0.4), y, system.pack()) for system in (made, known)]
     assert fields[0] == pytest.approx(fields[1], rel=1e-13, abs=1e-14)
     assert made.separable == known.separable
 
@@ -141,7 +141,7 @@ def test_a_chain_of_links_has_the_field_that_its_mass_matrix_gives(n):
         y = np.random.default_rng(seed).normal(size=2 * n + 2)
         matrix, forcing = both(*y, *parameters.values())
         expected = np.linalg.solve(matrix, forcing).ravel()
-        value = emit.numpy(system, "field")(0.0, y, system.pack())
+        value = targets.numpy(system, "field")(0.0, y, system.pack())
         assert value == pytest.approx(expected, rel=1e-11, abs=1e-11)  # measured 3e-14
 
 

@@ -11,7 +11,7 @@ import numba
 import numpy as np
 
 from integrators.stepping import FixedStep
-from problems import emit
+from problems import targets
 
 W = (-1.17767998417887, 0.235573213359357, 0.784513610477560)  # solution A of the paper
 WEIGHTS = (W[2], W[1], W[0], 1.0 - 2.0 * sum(W), W[0], W[1], W[2])
@@ -31,7 +31,11 @@ class Yoshida6(FixedStep):
         return None if problem.system.separable else "it needs H = sum of c p^2/2 + V(q, t)."
 
     def march(self, system):
-        force, scale, dof = emit.numba(system, "force"), emit.numba(system, "velocity_scale"), system.dof
+        force, scale, dof = (
+            targets.numba(system, "force"),
+            targets.numba(system, "velocity_scale"),
+            system.dof,
+        )
 
         @numba.njit(error_model="numpy")
         def march(t, h, first, n, y, par):

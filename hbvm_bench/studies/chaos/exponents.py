@@ -19,7 +19,7 @@ from integrators.dynamics.lyapunov import Exponents, lyapunov
 from integrators.dynamics.vectors import random_vectors
 from integrators.methods.hbvm import HBVM
 from integrators.protocol import Array, Status
-from problems import Problem, emit
+from problems import Problem, targets
 from problems.errors import InputError
 
 METHOD = HBVM()
@@ -116,7 +116,7 @@ class Variational:
         import heyoka as hy
 
         self._problem, self._dim = problem, problem.system.dim
-        equations = hy.var_ode_sys(emit.heyoka(problem.system), hy.var_args.vars, order=1)
+        equations = hy.var_ode_sys(targets.heyoka(problem.system), hy.var_args.vars, order=1)
         self._taylor = hy.taylor_adaptive(equations, problem.y0.tolist(), tol=TOLERANCE)
         self._taylor.pars[:] = problem.par[: len(self._taylor.pars)]
         self._finished = hy.taylor_outcome.time_limit

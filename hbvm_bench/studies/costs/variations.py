@@ -19,7 +19,7 @@ from hbvm_bench.summaries.outcomes import OTHER_WORK
 from hbvm_bench.summaries.table import NONE, Table
 from integrators import HBVM, integrate
 from integrators.protocol import Array
-from problems import emit
+from problems import targets
 from problems.errors import InputError
 from problems.problem import Problem
 
@@ -48,7 +48,7 @@ class Variational:
         import heyoka as hy
 
         self._problem, self._done = problem(), hy.taylor_outcome.time_limit
-        equations = emit.heyoka(self._problem.system)
+        equations = targets.heyoka(self._problem.system)
         if count:
             equations = hy.var_ode_sys(equations, [equations[i][0] for i in range(count)], order=1)
         self._taylor = hy.taylor_adaptive(

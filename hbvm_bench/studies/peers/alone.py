@@ -18,7 +18,7 @@ import numpy as np
 from integrators import registry
 from integrators.peers import load
 from integrators.protocol import Array, Compiled, MethodBase, Samples, Stats, Status, Trajectories
-from problems import emit
+from problems import targets
 from problems.problem import System
 
 
@@ -119,7 +119,7 @@ class BatchProgram(Program):
         hy = load("heyoka")
         lanes = hy.recommended_simd_size()
         return hy.taylor_adaptive_batch(
-            emit.heyoka(self.system),
+            targets.heyoka(self.system),
             np.zeros((self.system.dim, lanes)),
             pars=np.zeros((self.system.n_par, lanes)),
             **self.method.options(defaults=True),
@@ -130,7 +130,7 @@ def _heyoka(system: System, method: MethodBase) -> Begin:
     """``taylor_adaptive(...).propagate_until(t_end)``."""
     hy = load("heyoka")
     integrator = hy.taylor_adaptive(
-        emit.heyoka(system), [0.0] * system.dim, pars=[0.0] * system.n_par, **method.options(defaults=True)
+        targets.heyoka(system), [0.0] * system.dim, pars=[0.0] * system.n_par, **method.options(defaults=True)
     )
 
     def begin(y0: Array, par: Array, t0: float) -> Call:
@@ -221,7 +221,7 @@ def _force(system: System, par: Array) -> Any:
 
     from integrators.peers.rebound.hooks import _pointer
 
-    kernel, dof = emit.numba(system, "force"), system.dim // 2
+    kernel, dof = targets.numba(system, "force"), system.dim // 2
     particles = load("rebound").Simulation._particles.offset // 8
 
     @numba.cfunc(types.void(types.voidptr))
@@ -241,13 +241,13 @@ def _diffrax(system: System, method: Any) -> Begin:
     name, dof = type(method).__name__, system.dim // 2
     halves = name == "SemiImplicitEuler"
     if halves:
-        scale, push = emit.jax(system, "velocity_scale"), emit.jax(system, "force")
+        scale, push = targets.jax(system, "velocity_scale"), targets.jax(system, "force")
         terms: Any = (
             dx.ODETerm(lambda t, p, par: scale(t, p, par) * p),
             dx.ODETerm(lambda t, q, par: push(t, q, par)),
         )
     else:
-        terms = dx.ODETerm(emit.jax(system, "field"))
+        terms = dx.ODETerm(targets.jax(system, "field"))
     h = getattr(method, "h", None)
     controller = dx.ConstantStepSize() if h else dx.PIDController(rtol=method.rtol, atol=method.atol)
 
@@ -273,10 +273,10 @@ def _diffrax(system: System, method: Any) -> Begin:
 def _scipy(system: System, method: Any) -> Begin:
     """``solve_ivp(f, (t0, t_end), y0, method=..., rtol=..., atol=...)`` with a compiled f."""
     solve_ivp = load("scipy", "scipy.integrate").solve_ivp
-    field = emit.numba(system, "field")
+    field = targets.numba(system, "field")
     known = system.jacobian()
     pattern: Any = cast(Any, known)
-    entries: Any = None if known is None else emit.numba(system, known)
+    entries: Any = None if known is None else targets.numba(system, known)
 
     def begin(y0: Array, par: Array, t0: float) -> Call:
         def f(t: float, y: Array) -> Array:
@@ -304,9 +304,9 @@ def _scipy(system: System, method: Any) -> Begin:
 def _sundae(system: System, method: Any) -> Begin:
     """``CVODE(f, jacfn=..., rtol=..., atol=...).solve([t0, t_end], y0)`` with compiled functions."""
     solver = load("scikit-sundae", "sksundae.cvode").CVODE
-    field, known = emit.numba(system, "field"), system.jacobian()
+    field, known = targets.numba(system, "field"), system.jacobian()
     pattern: Any = cast(Any, known)
-    entries: Any = None if known is None else emit.numba(system, known)
+    entries: Any = None if known is None else targets.numba(system, known)
 
     def begin(y0: Array, par: Array, t0: float) -> Call:
         def f(t: float, y: Array, out: Array) -> None:

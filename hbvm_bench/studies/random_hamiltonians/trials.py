@@ -16,7 +16,7 @@ from hbvm_bench.studies.random_hamiltonians import systems
 from integrators import integrate
 from integrators.protocol import Array, MethodBase, Status
 from integrators.solution import Solution
-from problems import Problem, emit
+from problems import Problem, targets
 from problems.errors import InputError
 
 TOLERANCE = 1e-10
@@ -251,7 +251,7 @@ def energy_scale(problem: Problem, states: Array) -> float:
     The sum of abs(dH/dy_i y_i), the largest of some states of shape (n, dim). The size of the energy itself
     has no meaning: a constant may be added to it.
     """
-    field = emit.numpy(problem.system, "field")
+    field = targets.numpy(problem.system, "field")
     half = states.shape[1] // 2
     slopes = [np.array(field(problem.t0, y, problem.par)) for y in states]
     return max(

@@ -11,7 +11,7 @@ from integrators.kernel.native.field import compile_field
 from integrators.kernel.native.memory import aligned
 from integrators.kernel.step.rule import FIRST_RATE, LOG_RESIDUAL_VARYING, TOLERANCE
 from integrators.protocol import Array
-from problems import emit
+from problems import targets
 from problems.problem import System
 
 
@@ -140,7 +140,7 @@ class Adjoint:
         n, dof, k = positions.shape
         flat = positions.swapaxes(0, 1).reshape(dof, -1)
         times = (heads[:, [0]] + heads[:, [2]] * heads[:, [3]]) + heads[:, [3]] * self._nodes
-        forces = emit.numpy(self._system, "force")(
+        forces = targets.numpy(self._system, "force")(
             times.reshape(-1), np.concatenate([flat, np.zeros_like(flat)]), self._par
         )
         forces = forces.reshape(dof, n, k).swapaxes(0, 1)
@@ -164,7 +164,7 @@ class Adjoint:
         t0, _, n, h = head[:4].tolist()
         times = t0 + (n + 1.0) * h - h * self._nodes
         units = np.repeat(np.eye(dim), k, axis=1)  # weights: each unit vector at each stage
-        product = emit.numpy(self._system, self._system.product("state"))
+        product = targets.numpy(self._system, self._system.product("state"))
         at = np.concatenate([units, np.tile(stages, (1, dim))])
         jacobians = product(np.tile(times, dim), at, self._par).reshape(dim, dim, k)  # [d, e]: df_e/dy_d
         end = context.read()
@@ -178,7 +178,7 @@ class Adjoint:
         context.length = 0.0
         if self._wanted:
             at = np.concatenate([solved.T, stages])
-            slopes = emit.numpy(self._system, self._system.product("parameters"))(times, at, self._par)
+            slopes = targets.numpy(self._system, self._system.product("parameters"))(times, at, self._par)
             self._memory.sums[:] += h * (slopes @ weights)
 
     @property

@@ -17,10 +17,10 @@ from integrators.kernel.native import binary, machine
 from integrators.kernel.native.field import compile_around
 from integrators.kernel.native.memory import Numbers, aligned
 from integrators.kernel.tables import Constants
-from problems import emit
+from problems import targets
+from problems.graph.functions import FUNCTIONS
+from problems.graph.nodes import reachable
 from problems.systems.base import System
-from problems.trace.functions import FUNCTIONS
-from problems.trace.graph import reachable
 
 LANES = 8  # of a register of AVX-512
 # Operations not waited for
@@ -62,7 +62,7 @@ class Lanes:
         self._compile(system, constants, "force" if second else "field", second, unit, varying, groups)
 
     def _compile(
-        self, system: System, constants: Constants, quantity: emit.Quantity, second: bool, unit: bool,
+        self, system: System, constants: Constants, quantity: targets.Quantity, second: bool, unit: bool,
         varying: bool, groups: Blocks, vectors: Blocks = (),
     ) -> None:  # fmt: skip
         """Compile the steps around a function of stages of `rows` components."""
@@ -136,7 +136,7 @@ class Lanes:
         if not self.second:
             return np.ones((len(par), self.rows))
         there = np.zeros((self.system.dim, len(par)))
-        scales = emit.numpy(self.system, "velocity_scale")(0.0, there, np.ascontiguousarray(par.T))
+        scales = targets.numpy(self.system, "velocity_scale")(0.0, there, np.ascontiguousarray(par.T))
         return np.ascontiguousarray(scales.T)
 
     def groups(

@@ -13,8 +13,8 @@ import numpy as np
 from integrators.kernel.native import binary, raised, store
 from integrators.kernel.native.field import BUILT_BY
 from integrators.kernel.native.stages import build
-from problems import Problem, emit
-from problems.calculus.function import Function
+from problems import Problem, targets
+from problems.derive.function import Function
 from problems.errors import InputError
 
 LANES = 8
@@ -214,7 +214,7 @@ def _numbers(address: int, count: int) -> Any:
 
 def _compiled(traced: Function) -> binary.Native:
     """Compile a traced function on lanes, or load it."""
-    text, function = emit.numba_of(traced, "event")
+    text, function = targets.numba_of(traced, "event")
     name = store.key("event", text, binary.sources(BUILT_BY))
     return binary.obtain(name, lambda: build(function, LANES))
 

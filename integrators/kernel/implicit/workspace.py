@@ -16,8 +16,8 @@ from integrators.kernel.native.field import BUILT_BY
 from integrators.kernel.native.memory import aligned
 from integrators.kernel.parts.implicit import ALWAYS_IMPLICIT, AUTO, FIXED_POINT
 from integrators.kernel.tables import packed
-from problems import emit
-from problems.calculus.jacobian import Jacobian
+from problems import targets
+from problems.derive.jacobian import Jacobian
 from problems.errors import InputError
 from problems.systems.base import System
 
@@ -62,13 +62,13 @@ def linearization(system: System, *, second: bool) -> Linearization:
     if jacobian is None:
         return Linearization(None, None, system.sparsity)
     try:
-        emit.compilable(system, jacobian)
+        targets.compilable(system, jacobian)
     except InputError:  # differences take the field alone
         return Linearization(None, None)
-    text = emit.source(system, jacobian, "numba").text
+    text = targets.source(system, jacobian, "numba").text
     name = store.key("jacobian", text, binary.sources(BUILT_BY))
     native = binary.obtain(
-        name, lambda: (stages.ONE_BY_ONE, stages.build_one_by_one(emit.numba(system, jacobian).py_func, 1))
+        name, lambda: (stages.ONE_BY_ONE, stages.build_one_by_one(targets.numba(system, jacobian).py_func, 1))
     )
     return Linearization(jacobian, native)
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from integrators.protocol import Array
-from problems import emit
+from problems import targets
 from problems.problem import System
 
 SHIFT = 3e-3  # of the time in which the state changes by its own size: how far the neighbours are
@@ -16,7 +16,7 @@ NEARLY = 0.1
 
 
 def independent(
-    system: System, quantity: emit.Quantity, metric: Array, y: Array, par: Array, t: float
+    system: System, quantity: targets.Quantity, metric: Array, y: Array, par: Array, t: float
 ) -> NDArray[np.bool_]:
     """Tell which invariants to keep so that all are kept, one gradient orthogonalized after another.
 
@@ -42,7 +42,7 @@ def independent(
     ndarray of bool, shape (n,)
         All true where anything is not finite.
     """
-    function = emit.numpy(system, quantity)
+    function = targets.numpy(system, quantity)
     dim = y.size
     with np.errstate(all="ignore"):
         slope = function(t, y, par)[:dim]

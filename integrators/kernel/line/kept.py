@@ -13,12 +13,12 @@ from integrators.kernel.line.dependence import independent
 from integrators.kernel.native.field import compile_field
 from integrators.kernel.tables import Constants, packed
 from integrators.protocol import Array
-from problems import emit
-from problems.calculus.function import Function
+from problems import targets
+from problems.derive.function import Function
 from problems.errors import InputError
+from problems.graph.nodes import T
 from problems.problem import System
 from problems.systems.poisson import Poisson
-from problems.trace.graph import T
 
 
 class Kept:
@@ -137,7 +137,7 @@ def metric_of(system: System, par: Array) -> Array:
     and heavy bodies alike. W does not depend on the state, so the method is symmetric.
     """
     if system.separable and system.dof is not None:
-        c = emit.numpy(system, "velocity_scale")(0.0, np.zeros(system.dim), par)
+        c = targets.numpy(system, "velocity_scale")(0.0, np.zeros(system.dim), par)
         if np.isfinite(c).all() and (c > 0.0).all():
             return np.concatenate([c, 1.0 / c])
     return np.ones(system.dim)

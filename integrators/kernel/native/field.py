@@ -10,13 +10,13 @@ from collections.abc import Callable
 
 from integrators.kernel.native import binary, stages, store
 from integrators.kernel.native.stages import ON_LANES
-from problems import emit
+from problems import targets
 from problems.systems.base import System
 
 BUILT_BY = stages.__name__
 
 
-def compile_field(system: System, quantity: emit.Quantity, lanes: int) -> binary.Native:
+def compile_field(system: System, quantity: targets.Quantity, lanes: int) -> binary.Native:
     """Compile one of a system's functions for stage memory, or load it.
 
     Parameters
@@ -33,13 +33,13 @@ def compile_field(system: System, quantity: emit.Quantity, lanes: int) -> binary
     Native
         Its note is `ON_LANES` or `ONE_BY_ONE`.
     """
-    source = emit.source(system, quantity, "numba")
+    source = targets.source(system, quantity, "numba")
     name = store.key("field", source.text, str(lanes), binary.sources(BUILT_BY))
-    return binary.obtain(name, lambda: stages.build(emit.numba(system, quantity).py_func, lanes))
+    return binary.obtain(name, lambda: stages.build(targets.numba(system, quantity).py_func, lanes))
 
 
 def compile_around(
-    system: System, quantity: emit.Quantity, lanes: int, module: str, form: object,
+    system: System, quantity: targets.Quantity, lanes: int, module: str, form: object,
     written: Callable[[str], str], *, par: bool = False,
 ) -> binary.Native:  # fmt: skip
     """Compile LLVM's text that is written around one of a system's functions on lanes, or load it.
@@ -64,17 +64,17 @@ def compile_around(
     numba.NumbaError
         If the function cannot be compiled on lanes.
     """
-    source = emit.source(system, quantity, "numba")
+    source = targets.source(system, quantity, "numba")
     name = store.key("around", source.text, str(lanes), repr(form), binary.sources(BUILT_BY, module))
 
     def make() -> tuple[str, bytes]:
-        function, arguments = stages.on_lanes(emit.numba(system, quantity).py_func, lanes, par=par)
+        function, arguments = stages.on_lanes(targets.numba(system, quantity).py_func, lanes, par=par)
         return ON_LANES, binary.build(function, arguments, around=written)
 
     return binary.obtain(name, make)
 
 
-def assembly(system: System, quantity: emit.Quantity, lanes: int) -> str:
+def assembly(system: System, quantity: targets.Quantity, lanes: int) -> str:
     """Return the machine code of a field, as text; the arguments are those of `compile_field`.
 
     Raises
@@ -82,4 +82,4 @@ def assembly(system: System, quantity: emit.Quantity, lanes: int) -> str:
     numba.NumbaError
         If it cannot be compiled.
     """
-    return stages.assembly(emit.numba(system, quantity).py_func, lanes)
+    return stages.assembly(targets.numba(system, quantity).py_func, lanes)

@@ -15,7 +15,7 @@ import numpy as np
 from integrators.kernel.native import binary, raised
 from integrators.kernel.native.field import compile_field
 from integrators.kernel.native.stages import ONE_BY_ONE
-from problems import emit
+from problems import targets
 from problems.systems.base import System
 from problems.systems.untraced import Foreign
 
@@ -23,7 +23,7 @@ _functions: WeakKeyDictionary[Foreign, dict[int, tuple[int, Any]]] = WeakKeyDict
 """The address of each field by lanes, and the function that it is of: as long as its system is there."""
 
 
-def field_of(system: System, quantity: emit.Quantity, lanes: int) -> binary.Native:
+def field_of(system: System, quantity: targets.Quantity, lanes: int) -> binary.Native:
     """Return one of a system's functions for stage memory; see `field.compile_field`.
 
     Raises

@@ -13,7 +13,7 @@ import tempfile
 from contextlib import AbstractContextManager
 from pathlib import Path
 
-from problems.emit.cache import directory, locked
+from problems.targets.cache import directory, locked
 
 DIGEST = 32
 
@@ -37,7 +37,7 @@ def _digest(name: str, content: bytes) -> bytes:
 
 
 def making(name: str) -> AbstractContextManager[None]:
-    """Return a context that one process at a time enters for a key; see `problems.emit.cache.locked`."""
+    """Return a context that one process at a time enters for a key; see `problems.targets.cache.locked`."""
     return locked(directory() / "locks" / name)
 
 

@@ -6,7 +6,7 @@ from integrators.kernel.native.memory import Array, Integer, Part, Pointer, Real
 class Pace(Part):
     """Reversible steps, of length `epsilon` / density; see `step.reversible`."""
 
-    code = Pointer()  # `problems.emit.time_scale`, called like the field; 0: no such steps
+    code = Pointer()  # `problems.targets.time_scale`, called like the field; 0: no such steps
     rows = Integer()
     parameters = Integer()
     par = Array("parameters")

@@ -24,7 +24,7 @@ from integrators.kernel.simd.lanes import (
     spread_to,
     type_callable,
 )
-from problems.emit.room import room
+from problems.targets.room import room
 
 
 class Rows(types.Type):

@@ -1,6 +1,6 @@
 r"""Adaptive steps that are the same backwards.
 
-The density rho of the steps follows the rate w of the field (`problems.emit.time_scale`), (log rho)' = w'/w:
+The density rho of the steps follows the rate w of the field (`targets.time_scale`), (log rho)' = w'/w:
 
     log rho_{n+1/2} - log rho_{n-1/2} = epsilon (w'/w)(y_n) / ((rho_{n-1/2} + rho_{n+1/2})/2),
     h_{n+1/2} = epsilon / rho_{n+1/2},     log rho_{1/2} = log w(y_0) + (epsilon/2) (w'/w^2)(y_0).

@@ -9,7 +9,7 @@ from integrators.kernel.native.field import compile_field
 from integrators.kernel.native.memory import Content, aligned
 from integrators.kernel.step.rule import FIRST_RATE
 from integrators.protocol import Array
-from problems import emit
+from problems import targets
 from problems.problem import System
 
 
@@ -149,7 +149,7 @@ class Group:
             return None
         along = system.tangent("velocity_scale", self.count, parameters=True)
         par = np.concatenate([base.par, *chosen.parameters.T])
-        slopes = emit.numpy(system, along)(0.0, np.zeros(0), par)
+        slopes = targets.numpy(system, along)(0.0, np.zeros(0), par)
         pulls = aligned(slopes.size)
         pulls[:] = slopes / np.tile(base.factors.velocity[: base.shape.rows], self.count)
         return pulls if pulls.any() else None

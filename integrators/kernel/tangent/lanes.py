@@ -12,8 +12,8 @@ from integrators.kernel.ensemble.prepared import STAGES, Lanes, groups_of
 from integrators.kernel.native.memory import Numbers
 from integrators.kernel.tables import Constants
 from integrators.kernel.tangent.vectors import OPERATIONS
+from problems.graph.nodes import reachable
 from problems.systems.base import System
-from problems.trace.graph import reachable
 
 MOST_ROWS = 64
 """Components of a stage, vectors included: beyond, trajectories go one by one."""

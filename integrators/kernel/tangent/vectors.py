@@ -11,8 +11,8 @@ from integrators.kernel.implicit.workspace import Workspace
 from integrators.kernel.tangent.group import Directions, Group, function_of
 from integrators.kernel.tangent.memory import Tangents
 from integrators.protocol import Array
+from problems.graph.nodes import reachable
 from problems.problem import System
-from problems.trace.graph import reachable
 
 MOST = 8  # vectors in a group
 FEWEST = 2  # samples that there is room for, of which nobody may want to know: those of single steps

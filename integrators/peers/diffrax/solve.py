@@ -20,7 +20,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from problems import emit
+from problems import targets
 from problems.errors import InputError
 from problems.problem import System
 
@@ -230,13 +230,13 @@ def _apart(f: Callable[..., Any]) -> Callable[..., Any]:
 def terms(system: System, sign: int, solver: str) -> Any:
     """Return a system as diffrax's terms in tau = sign t, for `SemiImplicitEuler` q' from p and p' from q."""
     if solver == "SemiImplicitEuler":
-        scale, force = emit.jax(system, "velocity_scale"), emit.jax(system, "force")
+        scale, force = targets.jax(system, "velocity_scale"), targets.jax(system, "force")
         return (
             dx.ODETerm(lambda tau, p, par: sign * (scale(sign * tau, p, par) * p)),
             dx.ODETerm(lambda tau, q, par: sign * force(sign * tau, q, par)),
         )
-    f = emit.jax(system, "field")
-    if solver == "Dopri8" and emit.source(system, "field", "jax").text.count("\n") > SMALL_FIELD:
+    f = targets.jax(system, "field")
+    if solver == "Dopri8" and targets.source(system, "field", "jax").text.count("\n") > SMALL_FIELD:
         f = _apart(f)
     return dx.ODETerm(lambda tau, y, par: sign * f(sign * tau, y, par))
 
@@ -248,7 +248,7 @@ def solve_for(system: System, solver: str, sign: int, adaptive: bool) -> tuple[S
     """Return the compiled solve for a system, and whether this process had it already."""
     split = solver == "SemiImplicitEuler"
     whats = ("velocity_scale", "force") if split else ("field",)
-    emitted = tuple(emit.source(system, name, "jax").sha256 for name in whats)
+    emitted = tuple(targets.source(system, name, "jax").sha256 for name in whats)
     key = (emitted, system.dim, system.n_par, solver, sign, adaptive)
     if known := _solves.get(key):
         return known, True

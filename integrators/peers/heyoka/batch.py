@@ -13,7 +13,7 @@ from integrators.protocol import Array, Status, Trajectories
 from integrators.refusals import check_batch, check_times
 from integrators.running.times import Counts
 from integrators.running.watchdog import STALL_STEPS, StallDetector
-from problems import emit
+from problems import targets
 from problems.systems.base import System
 
 
@@ -34,7 +34,7 @@ class Lanes:
         self.size = int(hy.recommended_simd_size())
         started = perf_counter()
         self._ta = hy.taylor_adaptive_batch(
-            emit.heyoka(system),
+            targets.heyoka(system),
             np.zeros((system.dim, self.size)),
             **options,
         )

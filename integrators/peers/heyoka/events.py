@@ -10,7 +10,7 @@ from integrators.events.event import Event
 from integrators.events.finder import EventLog
 from integrators.peers import load
 from integrators.protocol import Array
-from problems import emit
+from problems import targets
 from problems.problem import Problem
 
 CLOSE = 64  # units in the last place: an event so near the start is none
@@ -45,7 +45,7 @@ def heyoka_events(problem: Problem, events: Mapping[str, Event]) -> list[Any]:
     hy, result = load("heyoka"), []
     for i, (name, event) in enumerate(events.items()):
         traced = problem.system.trace(event.g, f"event {name!r}")
-        result.append(hy.nt_event(emit.heyoka_of(problem.system, traced), Recorder(i)))
+        result.append(hy.nt_event(targets.heyoka_of(problem.system, traced), Recorder(i)))
     return result
 
 

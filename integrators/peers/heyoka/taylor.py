@@ -146,10 +146,10 @@ class TaylorProgram(ProgramBase):
 
         It has the parameters up to the last one that its formulas contain.
         """
-        from problems import emit
+        from problems import targets
 
         return load("heyoka").taylor_adaptive(
-            emit.heyoka(self.system), [0.0] * self.system.dim, **self._options, **more
+            targets.heyoka(self.system), [0.0] * self.system.dim, **self._options, **more
         )
 
     def with_events(
@@ -226,9 +226,9 @@ class TaylorProgram(ProgramBase):
 
 def _say_if_long(system: System, method: Taylor) -> None:
     """Warn of a field that takes long to compile without loops."""
-    from problems import emit
+    from problems import targets
 
-    lines = emit.source(system, "field", "heyoka").text.count("\n")
+    lines = targets.source(system, "field", "heyoka").text.count("\n")
     seconds = SECONDS * (lines / LINES) ** 2
     if not method.compact_mode and seconds > PATIENCE:
         warnings.warn(

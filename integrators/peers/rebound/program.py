@@ -92,14 +92,14 @@ class ReboundProgram(ProgramBase):
             raise InputError(f"{method!r} cannot integrate {system.name}: {reason}")
         self.rebound = load("rebound")
         from integrators.peers.rebound import hooks
-        from problems import emit
+        from problems import targets
 
         started = perf_counter()
         self.method, self.hooks = method, hooks
         self.watch, self.force = hooks.watchdog(), hooks.counter() if method.counted else None
         if system.bodies is None:
             known = hooks.forces.cache_info().hits
-            self.force = hooks.forces(emit.numba(system, "force"), system.dim // 2, system.n_par)
+            self.force = hooks.forces(targets.numba(system, "force"), system.dim // 2, system.n_par)
             self.from_cache = hooks.forces.cache_info().hits > known
         self.compile_seconds = perf_counter() - started
 
@@ -146,14 +146,14 @@ class ReboundProgram(ProgramBase):
             return simulation.__reduce__()[1][0]
 
     def _check_gravity(self, layout: "Layout", t: float, y: Array) -> None:
-        from problems import emit
+        from problems import targets
 
         simulation = self._bodies(layout, t, y)
         choose(simulation, "leapfrog")
         simulation.dt = 0.0
         simulation.steps(1)
         dof = self.system.dim // 2
-        ours = emit.numpy(self.system, "field")(t, y, layout.par)[dof:]
+        ours = targets.numpy(self.system, "field")(t, y, layout.par)[dof:]
         theirs = layout.mass * self.hooks.particles(simulation)[layout.place, 6 : 6 + layout.width].ravel()
         if not np.allclose(theirs, ours, rtol=0.0, atol=AGREES * float(np.max(np.abs(ours)))):
             raise InputError(
@@ -178,7 +178,7 @@ class Layout:
     """
 
     def __init__(self, system: System, par: Array, method: ReboundMethod) -> None:
-        from problems import emit
+        from problems import targets
 
         dof = system.dim // 2
         self.bodies, self.par = system.bodies, par
@@ -196,7 +196,7 @@ class Layout:
         else:
             self.width, self.n = 3, -(-dof // 3)
             self.G, self.masses, self.place = 0.0, np.ones(self.n), np.arange(self.n)
-            scale = emit.numpy(system, "velocity_scale")(0.0, np.zeros(system.dim), par)
+            scale = targets.numpy(system, "velocity_scale")(0.0, np.zeros(system.dim), par)
             self.mass = 1.0 / scale
             self.numbers = np.concatenate([par, scale, np.zeros(2 * dof)])
 

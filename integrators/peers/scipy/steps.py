@@ -26,16 +26,16 @@ class SciPyProgram(ProgramBase):
     def __init__(self, system: System, method: MethodBase):
         super().__init__(system, method)
         integrate = load("scipy", "scipy.integrate")
-        from problems import emit
+        from problems import targets
 
         started = perf_counter()
         self.solver = getattr(integrate, self.method.solver)
-        self.field = emit.numba(system, "field")
+        self.field = targets.numba(system, "field")
         if system.traced:  # the first call compiles for these types; a user's own function may not know t = 0
             self.field(0.0, np.ones(system.dim), system.pack({}), np.empty(system.dim))
         self.jacobian = system.jacobian() if self.method.implicit else None
         if self.jacobian is not None:
-            self.entries = emit.numba(system, self.jacobian)
+            self.entries = targets.numba(system, self.jacobian)
             self.entries(0.0, np.ones(system.dim), system.pack({}), np.empty(self.jacobian.rows.size))
         self.from_cache = None
         self.compile_seconds = perf_counter() - started

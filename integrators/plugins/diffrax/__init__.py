@@ -12,7 +12,7 @@
 
 All features of diffrax are supported: jit, vmap, any PyTree as a state,
 dense output, step size controllers, events, all of its adjoints. A term of a traced
-system is ``diffrax.ODETerm(problems.emit.jax(system, "field"))`` with ``args=par``.
+system is ``diffrax.ODETerm(problems.targets.jax(system, "field"))`` with ``args=par``.
 """
 
 from collections.abc import Callable

@@ -13,7 +13,7 @@ from integrators.plugins import diffrax as plugin  # says what is missing, if JA
 from integrators.protocol import Array, MethodBase, Status, Trajectories
 from integrators.refusals import check_batch, check_times
 from integrators.running.times import plan
-from problems import emit
+from problems import targets
 from problems.errors import InputError
 from problems.systems.base import System
 
@@ -73,7 +73,7 @@ class JaxProgram:
             )
         kind: Any = plugin.Gauss if gauss else plugin.HBVM
         self._solver = kind(**{name: options[name] for name in ("k", "s") if name in options})
-        self._term = dx.ODETerm(emit.jax(system, "field"))
+        self._term = dx.ODETerm(targets.jax(system, "field"))
         self.system, self.h, self.compile_seconds = system, float(h), 0.0
         self.piece = SIDE_BY_SIDE.get(jax.default_backend(), SIDE_BY_SIDE["gpu"])
         self._made: dict[tuple[int, float], Any] = {}

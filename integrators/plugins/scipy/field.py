@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from problems import emit
+from problems import targets
 from problems.errors import InputError
 from problems.problem import Problem
 from problems.systems.base import System, Value
@@ -41,9 +41,9 @@ class Field:
         """Return the derivative at one state, (dim,), or at several, (dim, m)."""
         state = np.asarray(y, dtype=np.float64)
         if state.ndim != 1:
-            return emit.numpy(self.system, "field")(t, state, self.par)
+            return targets.numpy(self.system, "field")(t, state, self.par)
         if self._compiled is None:
-            self._compiled = emit.numba(self.system, "field")
+            self._compiled = targets.numba(self.system, "field")
         out = np.empty(state.size)
         self._compiled(float(t), state, self.par, out)
         return out

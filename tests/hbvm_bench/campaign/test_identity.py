@@ -83,7 +83,7 @@ EDITED = {
     "integrators/peers/rebound/ias15.py": [False, True],
     "integrators/running/integrate.py": [False, False],
     "integrators/solution.py": [True, True],
-    "problems/trace/graph.py": [True, True],
+    "problems/graph/nodes.py": [True, True],
     "problems/double_double.py": [True, True],
     "problems/catalogue/kepler.py": [True, True],
     "problems/catalogue/pendulum.py": [False, False],

@@ -6,7 +6,7 @@ import problems
 from hbvm_bench.reference import solutions
 from hbvm_bench.store.store import Store
 from integrators.extended import arithmetic
-from problems import emit
+from problems import targets
 from problems.errors import InputError
 
 Z_END = "-0.21429082377414021577602211142057"
@@ -112,7 +112,7 @@ def test_a_task_of_another_run_leaves_what_is_known_here():
 
 def test_a_rounded_number_is_rounded_in_more_digits_too():
     system = problems.VectorField(lambda y, m: [y[0] - m.round(y[0])], dim=1)
-    made = emit.source(system, "field", "numba")
+    made = targets.source(system, "field", "numba")
     out = np.zeros(1, complex)
     arithmetic.compiled(made.text, made.name)(0.0, np.array([2.75 + 1e-17j]), np.empty(0, complex), out)
     assert out[0] == -0.25 + 1e-17j  # by the doubles' text it would be 0

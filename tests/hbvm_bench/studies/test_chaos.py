@@ -13,13 +13,13 @@ from hbvm_bench.studies.chaos import exponents, maps, orbits, report
 from hbvm_bench.studies.chaos.systems import SKIP, SYSTEMS
 from hbvm_bench.summaries.table import NONE
 from integrators import lyapunov
-from problems import emit
+from problems import targets
 
 
 @pytest.mark.parametrize("name", [name for name, one in SYSTEMS.items() if one.divergence is not None])
 def test_the_divergence_is_the_trace_of_the_jacobian(name):
     problem = SYSTEMS[name].problem()
-    field = emit.numpy(problem.system, "field")
+    field = targets.numpy(problem.system, "field")
     rng = np.random.default_rng(3)
     step = 1e-6
     for y in problem.y0 + rng.uniform(-0.5, 0.5, (3, problem.system.dim)):

@@ -5,7 +5,7 @@ import pytest
 import problems
 from integrators.kernel import budget
 from integrators.kernel.native.field import assembly
-from problems import emit
+from problems import targets
 
 
 def test_the_operations_of_a_field_are_counted_without_those_of_parameters():
@@ -17,7 +17,7 @@ def test_the_operations_of_a_field_are_counted_without_those_of_parameters():
 
 def test_a_loop_counts_as_often_as_it_runs():
     chain = problems.load("fput", n=100)
-    found = budget.operations(emit.source(chain.system, "force", "numba").text)
+    found = budget.operations(targets.source(chain.system, "force", "numba").text)
     body = "def f(t, y, par, out):\n  for k in range(2, 12, 2):\n    out[k] = y[k]*y[k]\n"
     assert budget.operations(body) == {"*": 5}
     assert found["*"] > 99 * 4
@@ -25,7 +25,7 @@ def test_a_loop_counts_as_often_as_it_runs():
 
 def test_the_pairs_of_six_bodies_have_a_division_and_a_square_root_each():
     system = problems.load("outer_solar_system").system
-    found = budget.operations(emit.source(system, "force", "numba").text)
+    found = budget.operations(targets.source(system, "force", "numba").text)
     assert (found["/"], found["sqrt"]) == (15, 15)
 
 

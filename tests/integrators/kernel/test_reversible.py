@@ -7,7 +7,7 @@ import pytest
 
 import problems
 from integrators import Gauss, Status, integrate, load, order_of
-from problems import InputError, emit
+from problems import InputError, targets
 
 TWO_PI = 2.0 * np.pi
 
@@ -22,7 +22,7 @@ def run(problem, method, revolutions, samples=200):
 
 def drift(problem, y):
     """Return the change of the mean relative energy from the first to the last quarter, and its scatter."""
-    energy = emit.numpy(problem.system, "hamiltonian")(0.0, y.T, problem.par)[0]
+    energy = targets.numpy(problem.system, "hamiltonian")(0.0, y.T, problem.par)[0]
     parts = np.array_split(energy / energy[0], 4)
     return parts[-1].mean() - parts[0].mean(), np.std(energy / energy[0])
 

@@ -45,9 +45,9 @@ def test_the_step_satisfies_the_extended_collocation_conditions(henon_heiles):
 
 
 def field_of(problem, y):
-    from problems import emit
+    from problems import targets
 
-    return emit.numpy(problem.system, "field")(0.0, y, problem.par)
+    return targets.numpy(problem.system, "field")(0.0, y, problem.par)
 
 
 @pytest.mark.parametrize(

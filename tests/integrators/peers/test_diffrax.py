@@ -9,14 +9,14 @@ from integrators import Status, integrate
 from integrators.peers.diffrax import solve
 from integrators.peers.diffrax.methods import Dopri8, LeapfrogMidpoint, ReversibleHeun, SemiImplicitEuler
 from integrators.peers.heyoka.taylor import Taylor
-from problems import Hamiltonian, Problem, emit
+from problems import Hamiltonian, Problem, targets
 
 FIXED = [SemiImplicitEuler, LeapfrogMidpoint, ReversibleHeun, Dopri8]
 
 
 def plain(problem, solver, controller, dt0, end):
     """The same integration by diffrax alone, as its documentation shows."""
-    field = emit.jax(problem.system, "field")
+    field = targets.jax(problem.system, "field")
     solution = dx.diffeqsolve(
         dx.ODETerm(field),
         solver,

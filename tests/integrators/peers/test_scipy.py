@@ -10,7 +10,7 @@ import problems
 from integrators import Status, integrate
 from integrators.peers.heyoka.taylor import Taylor
 from integrators.peers.scipy import DOP853, RTOL_FLOOR, Radau
-from problems import emit
+from problems import targets
 from problems.problem import Problem
 
 METHODS = [DOP853(rtol=1e-10, atol=1e-12), Radau(rtol=1e-8, atol=1e-10)]
@@ -19,7 +19,7 @@ METHODS = [DOP853(rtol=1e-10, atol=1e-12), Radau(rtol=1e-8, atol=1e-10)]
 def dense(problem):
     """Return the Jacobian of a problem as `solve_ivp` takes it."""
     found = problem.system.jacobian()
-    entries = emit.numpy(problem.system, found)
+    entries = targets.numpy(problem.system, found)
 
     def matrix(t, y):
         made = np.zeros((y.size, y.size))
@@ -32,7 +32,7 @@ def dense(problem):
 @pytest.mark.parametrize("method", METHODS, ids=repr)
 def test_the_steps_are_those_of_solve_ivp(method):
     problem = testing.two_bodies()
-    field = emit.numpy(problem.system, "field")
+    field = targets.numpy(problem.system, "field")
     jac = {"jac": dense(problem)} if isinstance(method, Radau) else {}
     theirs = solve_ivp(
         lambda t, y: field(t, y, problem.par),

@@ -9,8 +9,8 @@ from hbvm_bench import cli
 from hbvm_bench.summaries import findings
 from problems import Hamiltonian
 from problems.analysis import structure
-from problems.analysis.latex import latex
 from problems.errors import InputError
+from problems.targets.latex import latex
 
 QUINTIC = "p^2*(1/2 + p^2) + p^2*(1 + p^2)*q + (1/2 + p + p^2)*q^2"
 

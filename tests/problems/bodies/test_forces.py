@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from integrators import HBVM, integrate, integrate_many
-from problems import InputError, emit, nbody
+from problems import InputError, nbody, targets
 from problems.bodies import (
     J2,
     Migration,
@@ -70,7 +70,7 @@ def test_zonal_harmonics_are_the_gradient_of_their_potential_about_any_pole():
         forces=[Zonal(R=R, **J, pole=pole)],
         t_end=1.0,
     )
-    found = emit.numpy(problem.system, "field")(0.0, problem.y0, problem.par)[9:12]
+    found = targets.numpy(problem.system, "field")(0.0, problem.y0, problem.par)[9:12]
     with mpmath.workdps(40):
         axis = [
             mpmath.mpf(float(c)) / mpmath.sqrt(sum(mpmath.mpf(float(c)) ** 2 for c in pole)) for c in pole

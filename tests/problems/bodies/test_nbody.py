@@ -9,7 +9,7 @@ import pytest
 
 import problems
 from integrators import HBVM, integrate
-from problems import InputError, emit, nbody
+from problems import InputError, nbody, targets
 from problems.bodies import J2, PostNewtonian
 
 rng = np.random.default_rng(5)
@@ -21,7 +21,7 @@ OBLATE = J2(J2=0.02, R=0.4, body=1, pole=(1.0, 2.0, -0.5))
 def _accelerations(problem: problems.Problem, n: int, *, h: float = 1e-5) -> np.ndarray:
     """Return dv/dt at the start, of momenta by differences of the velocities along the flow."""
     system = problem.system
-    field = emit.numpy(system, "field")
+    field = targets.numpy(system, "field")
     slope = field(0.0, problem.y0, problem.par)
     if system.dof is None:
         return slope[3 * n :].reshape(n, 3)
@@ -36,7 +36,7 @@ def test_newton_is_the_one_of_the_catalogue():
     made = nbody(par["m"], known.y0[:18].reshape(n, 3), v.reshape(n, 3), G=par["G"], t_end=known.t_end)
     assert np.array_equal(made.y0[:18], known.y0[:18])
     assert made.system.bodies == known.system.bodies
-    fields = [emit.numpy(one.system, "field")(0.0, known.y0, known.par) for one in (made, known)]
+    fields = [targets.numpy(one.system, "field")(0.0, known.y0, known.par) for one in (made, known)]
     assert np.array_equal(*fields)
 
 
@@ -100,7 +100,7 @@ def test_the_pericentre_of_general_relativity():
 
 def test_velocities_are_those_that_were_given():
     bodies = nbody(MASSES, X, V, forces=[PostNewtonian(c=10.0)], t_end=1.0)
-    v = emit.numpy(bodies.system, "field")(0.0, bodies.y0, bodies.par)[:12]
+    v = targets.numpy(bodies.system, "field")(0.0, bodies.y0, bodies.par)[:12]
     assert v == pytest.approx(V.reshape(-1), abs=1e-15)
     assert np.abs(bodies.y0[12:] - np.repeat(MASSES, 3) * V.reshape(-1)).max() > 1e-4
 

@@ -5,7 +5,7 @@ import pytest
 
 import problems
 from problems import Problem, registry
-from problems.trace.graph import reachable
+from problems.graph.nodes import reachable
 
 
 @pytest.fixture(params=registry.built_in())

@@ -9,14 +9,14 @@ terms. Relative to the largest single term instead, compilers that contract prod
 import numpy as np
 import pytest
 
-from problems import emit
+from problems import targets
 
 STATES = 200
 TRANSCENDENTAL = {"sin", "cos", "exp", "log"}
 
 
 def _numba(problem, y):
-    field, out = emit.numba(problem.system, "field"), np.empty(y.shape)
+    field, out = targets.numba(problem.system, "field"), np.empty(y.shape)
     for i in range(y.shape[1]):
         column = np.empty(len(y))
         field(0.0, np.ascontiguousarray(y[:, i]), problem.par, column)
@@ -25,13 +25,13 @@ def _numba(problem, y):
 
 
 def _uses_transcendental(problem):
-    text = emit.source(problem.system, "field", "numba").text
+    text = targets.source(problem.system, "field", "numba").text
     return any(f"{name}(" in text for name in TRANSCENDENTAL)
 
 
 def test_numpy_and_numba_agree_bit_for_bit_or_within_2_ulp_of_the_terms(small, states, magnitudes):
     y = states(small, STATES)
-    ours = emit.numpy(small.system, "field")(0.0, y, small.par)
+    ours = targets.numpy(small.system, "field")(0.0, y, small.par)
     other = _numba(small, y)
     if _uses_transcendental(small):
         # The C library's functions and numpy's differ in the last bit; measured: 0.6 ulp.
@@ -43,8 +43,8 @@ def test_numpy_and_numba_agree_bit_for_bit_or_within_2_ulp_of_the_terms(small, s
 def test_jax_agrees_within_8_ulp_of_the_terms(small, states, magnitudes):
     jax = pytest.importorskip("jax")
     y = states(small, STATES)
-    ours = emit.numpy(small.system, "field")(0.0, y, small.par)
-    field = emit.jax(small.system, "field")
+    ours = targets.numpy(small.system, "field")(0.0, y, small.par)
+    field = targets.jax(small.system, "field")
     other = np.asarray(jax.jit(jax.vmap(lambda column: field(0.0, column, small.par), 1, 1))(y))
     # Compiled code contracts products and sums; measured: 5 ulp (solar_system).
     assert (np.abs(ours - other) <= 8 * np.spacing(magnitudes(small, y))).all()
@@ -53,8 +53,8 @@ def test_jax_agrees_within_8_ulp_of_the_terms(small, states, magnitudes):
 def test_heyoka_agrees_within_8_ulp_of_the_terms(small, states, magnitudes):
     hy = pytest.importorskip("heyoka")
     y = states(small, STATES)
-    ours = emit.numpy(small.system, "field")(0.0, y, small.par)
-    pairs = emit.heyoka(small.system)
+    ours = targets.numpy(small.system, "field")(0.0, y, small.par)
+    pairs = targets.heyoka(small.system)
     right = [expression for _, expression in pairs]
     compiled = hy.cfunc(right, vars=[variable for variable, _ in pairs], compact_mode=True)
     rows = 1 + max((int(str(p)[1:]) for e in right for p in hy.get_params(e)), default=-1)

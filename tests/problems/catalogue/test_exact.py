@@ -9,7 +9,7 @@ import pytest
 
 import integrators
 import problems
-from problems import emit
+from problems import targets
 from problems.catalogue import _starts as starts
 from problems.catalogue import figure_eight, kepler, morse, pendulum, period_annulus, solar_system
 from problems.catalogue.henon_heiles import SADDLES, beyond_triangle, inside_triangle
@@ -175,7 +175,7 @@ def test_the_pericentre_of_a_geodesic_advances_as_elliptic_integrals_say():
 
 def test_the_annulus_ends_at_a_loop_through_a_saddle():
     problem = problems.load("period_annulus")
-    field = emit.numpy(problem.system, "field")
+    field = targets.numpy(problem.system, "field")
     for point in (period_annulus.P1, period_annulus.P2):
         # Measured 4e-15.
         assert np.abs(field(0.0, np.array(point), problem.par)).max() <= 1e-14
@@ -199,7 +199,7 @@ def test_the_annulus_ends_at_a_loop_through_a_saddle():
 
 def test_the_triangle_is_that_of_the_saddles():
     problem = problems.load("henon_heiles")
-    field = emit.numpy(problem.system, "field")
+    field = targets.numpy(problem.system, "field")
     for q in SADDLES:
         y = np.array([*q, 0.0, 0.0])
         assert np.abs(field(0.0, y, problem.par)).max() <= 2e-16

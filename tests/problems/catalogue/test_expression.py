@@ -15,13 +15,13 @@ import problems
 from hbvm_bench.campaign import file as campaign
 from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.run import loop
-from problems import emit
+from problems import targets
 from problems.analysis import structure
 from problems.catalogue import _formula as formula
 from problems.catalogue import expression
 from problems.errors import InputError
-from problems.trace.arguments import Mathematics
-from problems.trace.graph import PAR, Graph
+from problems.graph.arguments import Mathematics
+from problems.graph.nodes import PAR, Graph
 
 _watched: list[str] | None = None
 
@@ -144,7 +144,7 @@ def test_a_formula_means_what_it_says(examples):
         text = f"({text}) + q2*p2*k"
         system = expression.hamiltonian(text, parameters={"k": 0.3})
         y = np.array([0.4, -0.7, 1.1, 0.2])
-        found = emit.numpy(system, "hamiltonian")(0.0, y, system.pack())[0]
+        found = targets.numpy(system, "hamiltonian")(0.0, y, system.pack())[0]
         expected = value(y[:2], y[2:], 0.3) + y[1] * y[3] * 0.3
         # Powers are expanded to products and half-integer ones to roots: measured 2e-14 relative.
         assert found == pytest.approx(expected, rel=1e-12, abs=1e-12)
@@ -239,7 +239,7 @@ def test_what_is_missing_is_named(text, parameters, reason):
 
 def test_powers_bind_as_in_mathematics():
     system = expression.hamiltonian("-q^2 + 2*p**-1 + p^(1/2) - 2^0.5*q")
-    value = emit.numpy(system, "hamiltonian")(0.0, np.array([3.0, 4.0]), system.pack())[0]
+    value = targets.numpy(system, "hamiltonian")(0.0, np.array([3.0, 4.0]), system.pack())[0]
     assert value == pytest.approx(-9.0 + 0.5 + 2.0 - math.sqrt(2) * 3)
     assert expression.hamiltonian("p1^2/2 + q2").dof == 2
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import problems
-from problems import emit
+from problems import targets
 
 STATES = 20
 
@@ -15,7 +15,7 @@ def motion(states):
 
     def evaluate(problem):
         y = states(problem, STATES, seed=7)
-        dy = emit.numpy(problem.system, "field")(0.0, y, problem.par)
+        dy = targets.numpy(problem.system, "field")(0.0, y, problem.par)
         dof = problem.system.dof
         return y[:dof], y[dof:], dy[:dof], dy[dof:]
 
@@ -149,7 +149,7 @@ def test_the_swinging_spring_hangs_and_pulls(motion):
     _close(dp, -30.0 * (r - 0.6) * q / r - 1.5 * 9.0 * np.array([[0.0], [0.0], [1.0]]))
     rest = problems.load("spring_pendulum", x=0.0, z=0.0, vy=0.0)
     # The force at rest is a difference of two equal forces; measured: 0.
-    assert np.abs(emit.numpy(rest.system, "field")(0.0, rest.y0, rest.par)).max() <= 1e-14
+    assert np.abs(targets.numpy(rest.system, "field")(0.0, rest.y0, rest.par)).max() <= 1e-14
 
 
 @pytest.mark.parametrize("n", [8, 100])
@@ -208,7 +208,7 @@ def test_atoms_feel_the_lennard_jones_force(motion, rings):
 def test_poisson_systems_have_their_equations(states):
     problem = problems.load("lotka_volterra")
     y = states(problem, STATES)
-    dy = emit.numpy(problem.system, "field")(0.0, y, problem.par)
+    dy = targets.numpy(problem.system, "field")(0.0, y, problem.par)
     a, b, c, nu, mu = problem.par
     species = [
         y[0] * (c * y[1] + c * nu) + b * c * y[0] * y[2] * (-a) - b * c * y[0] * mu,
@@ -218,7 +218,7 @@ def test_poisson_systems_have_their_equations(states):
     _close(dy, species)
     problem = problems.load("rigid_body", quartic=0.4)
     y = states(problem, STATES)
-    dy = emit.numpy(problem.system, "field")(0.0, y, problem.par)
+    dy = targets.numpy(problem.system, "field")(0.0, y, problem.par)
     omega = y / np.array([[2.0], [1.0], [2 / 3]]) + 0.4 * y**3
     _close(dy, np.cross(y, omega, axis=0))
 

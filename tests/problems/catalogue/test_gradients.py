@@ -4,8 +4,8 @@ import mpmath
 import numpy as np
 import sympy
 
-from problems import emit
-from problems.trace.graph import reachable
+from problems import targets
+from problems.graph.nodes import reachable
 
 STATES = 3
 
@@ -64,7 +64,9 @@ def test_gradients_agree_with_sympys(small, states, magnitudes):
     slope = [sympy.diff(energy, symbol) for symbol in symbols]
     exact = sympy.lambdify([symbols, parameters], slope, "mpmath", cse=True)
     y = states(small, STATES, seed=11)
-    field = emit.numpy(system, system.slope if system.kind == "poisson" else system.field)(0.0, y, small.par)
+    field = targets.numpy(system, system.slope if system.kind == "poisson" else system.field)(
+        0.0, y, small.par
+    )
     if system.kind == "hamiltonian":
         dof = system.dof
         field = np.concatenate([-field[dof:], field[:dof]])  # dH/dq, dH/dp

@@ -11,10 +11,10 @@ from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.reference import solutions as reference
 from hbvm_bench.reference import trusted
 from integrators.extended import collocation
-from problems import emit
+from problems import targets
 from problems.catalogue import kepler, morse, pendulum
 from problems.errors import InputError
-from problems.trace.graph import reachable
+from problems.graph.nodes import reachable
 
 STORED = sorted(path.stem for path in reference.folder().glob("*.json"))
 
@@ -104,7 +104,7 @@ def test_every_reference_belongs_to_a_problem_and_says_how_it_was_made(stem):
     assert {"method", "check", "agreement"} <= set(stored.provenance)
     apart = float(stored.provenance["agreement"].split(" ")[0])
     assert apart <= (1e-20 if problem.system.dim <= trusted.SMALL else 1e-15)
-    assert emit.fingerprint(problem.system) == stored.provenance["field"]
+    assert targets.fingerprint(problem.system) == stored.provenance["field"]
     if stem != "sitnikov":  # at the seed paper's own times
         times = [float.fromhex(t) for t in stored.t]
         grid = trusted.GRID

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 import problems
-from problems import emit
+from problems import targets
 
 
 def test_the_start_is_the_papers():
@@ -62,8 +62,8 @@ def test_a_half_turn_with_the_primaries_swapped_is_kept_bit_for_bit(values: np.n
     state = np.array([x, y, z, -x, -y, z, 0.0, 0.0, z3, px, py, pz, -px, -py, pz, 0.0, 0.0, pz3])
     problem = problems.load("sitnikov", m3=m3)
     compiled = np.empty(18)
-    emit.numba(problem.system, "field")(0.0, state, problem.par, compiled)
-    for field in (emit.numpy(problem.system, "field")(0.0, state, problem.par), compiled):
+    targets.numba(problem.system, "field")(0.0, state, problem.par, compiled)
+    for field in (targets.numpy(problem.system, "field")(0.0, state, problem.par), compiled):
         if not np.isfinite(field).all():
             assert math.hypot(x, y) < 1e-50  # the primaries met
             continue
@@ -90,9 +90,9 @@ def test_the_field_commutes_with_the_half_turn_bit_for_bit(state: np.ndarray):
         values = []
         for point in (state, turned(state)):
             if engine == "numpy":
-                values.append(emit.numpy(problem.system, "field")(0.0, point, problem.par))
+                values.append(targets.numpy(problem.system, "field")(0.0, point, problem.par))
             else:
                 out = np.empty(18)
-                emit.numba(problem.system, "field")(0.0, point, problem.par, out)
+                targets.numba(problem.system, "field")(0.0, point, problem.par, out)
                 values.append(out)
         assert np.array_equal(turned(values[0]), values[1], equal_nan=True), engine

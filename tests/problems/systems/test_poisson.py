@@ -5,7 +5,7 @@ import pytest
 
 import integrators
 import problems
-from problems import Poisson, Problem, emit
+from problems import Poisson, Problem, targets
 from problems.errors import InputError
 
 
@@ -20,11 +20,11 @@ def cross(y):
 def test_the_field_is_the_structure_times_the_gradient():
     system = Poisson(energy, cross, dim=3)
     y = np.array([0.3, -1.2, 0.7])
-    slope = emit.numpy(system, system.slope)(0.0, y, system.pack())
-    matrix = emit.numpy(system, system.structure)(0.0, y, system.pack()).reshape(3, 3)
+    slope = targets.numpy(system, system.slope)(0.0, y, system.pack())
+    matrix = targets.numpy(system, system.structure)(0.0, y, system.pack()).reshape(3, 3)
     assert slope == pytest.approx([y[0], y[1] / 2, 4 * y[2] ** 3], rel=1e-15)
     assert (matrix == -matrix.T).all()
-    field = emit.numpy(system, "field")(0.0, y, system.pack())
+    field = targets.numpy(system, "field")(0.0, y, system.pack())
     assert field == pytest.approx(matrix @ slope, rel=1e-14)
     assert (system.kind, system.dof, system.separable) == ("poisson", None, False)
     assert tuple(system.invariants) == ("energy",)

@@ -11,7 +11,7 @@ from hbvm_bench.studies.paper.experiments.departure import departure, step_state
 from integrators.methods.gauss import Gauss
 from integrators.methods.hbvm import HBVM
 from integrators.protocol import Array, MethodBase, Program
-from problems import emit
+from problems import targets
 from problems.catalogue.period_annulus import C_STAR, H_STAR, P1, period_annulus
 
 TOLERANCE = 2.0**-52
@@ -136,7 +136,7 @@ def periods(gaps: Sequence[float]) -> list[tuple[float, float]]:
 
 def field(point: Sequence[float]) -> Array:
     """Return (q', p') at a point (q, p)."""
-    return emit.numpy(PROBLEM.system, "field")(0.0, np.array(point), PROBLEM.par)
+    return targets.numpy(PROBLEM.system, "field")(0.0, np.array(point), PROBLEM.par)
 
 
 def eigenvalues(point: Sequence[float]) -> NDArray[np.complex128]:

@@ -11,7 +11,7 @@ from integrators.coefficients.tableau import tableau
 from integrators.methods.gauss import Gauss
 from integrators.methods.hbvm import HBVM
 from integrators.protocol import Array, MethodBase
-from problems import emit
+from problems import targets
 from problems.catalogue.henon_heiles import henon_heiles
 from problems.catalogue.period_annulus import period_annulus
 
@@ -157,7 +157,7 @@ def _residual(k: int, s: int, h: float = 0.5) -> float:
     sigma = np.linalg.solve(powers, values - problem.y0)  # coefficients of c, c^2, ...
     c, b = (leggauss(BIG)[0] + 1) / 2, leggauss(BIG)[1] / 2
     path = problem.y0 + np.vander(c, s + 1, increasing=True)[:, 1:] @ sigma
-    field = emit.numpy(problem.system, "field")
+    field = targets.numpy(problem.system, "field")
     f = np.stack([field(0.0, y, problem.par) for y in path])
     gamma = legendre(c, s).T @ (b[:, None] * f)
     nodes = tableau(k, s).c

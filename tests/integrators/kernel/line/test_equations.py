@@ -8,7 +8,7 @@ from integrators import HBVM, LineIntegral
 from integrators.coefficients.legendre import tables
 from integrators.kernel.line.kept import components
 from integrators.kernel.program import HBVMProgram
-from problems import emit
+from problems import targets
 
 
 def step_by_the_equations(problem, k, s, h, names, metric):
@@ -16,8 +16,8 @@ def step_by_the_equations(problem, k, s, h, names, metric):
     system, par, y = problem.system, problem.par, problem.y0
     table = tables(k, s)
     integrals, projection = table.integrals.hi, table.projection.hi
-    field = emit.numpy(system, "field")
-    slopes = [emit.numpy(system, system.gradient(name)) for name in names]
+    field = targets.numpy(system, "field")
+    slopes = [targets.numpy(system, system.gradient(name)) for name in names]
     rho = np.zeros((s, y.size))
     for _ in range(200):
         stages = y + h * integrals @ rho
@@ -62,7 +62,7 @@ def test_hbvm_on_a_poisson_system_solves_its_own_equations():
     problem = problems.load("lotka_volterra")
     system, par, y, h = problem.system, problem.par, problem.y0, 0.2
     table = tables(6, 2)
-    slope, structure = emit.numpy(system, system.slope), emit.numpy(system, system.structure)
+    slope, structure = targets.numpy(system, system.slope), targets.numpy(system, system.structure)
     rho = np.zeros((2, 3))
     for _ in range(200):
         stages = y + h * table.integrals.hi @ rho

@@ -16,7 +16,7 @@ import integrators.kernel.events.search
 from integrators import HBVM, Event, Gauss, LineIntegral, integrate
 from integrators.kernel.native import foreign
 from integrators.protocol import Status
-from problems import InputError, Opaque, Problem, VectorField, emit
+from problems import InputError, Opaque, Problem, VectorField, targets
 
 MU = 5.0
 METHODS = [
@@ -254,7 +254,7 @@ def test_methods_that_need_formulas_refuse_with_the_reason(method):
     with pytest.raises(InputError, match=r"cannot integrate .*needs (the field as a formula|a separable)"):
         integrate(started(WRITTEN["python"]), method)
     with pytest.raises(InputError, match="van_der_pol is not traced: its field is a Python function"):
-        emit.source(WRITTEN["python"], "field", "numba")
+        targets.source(WRITTEN["python"], "field", "numba")
 
 
 @pytest.mark.parametrize("kind", ["python", "numba"])
@@ -283,12 +283,14 @@ def test_events_and_checkpoints_work_as_ever():
 
 def test_a_fingerprint_follows_from_the_code_and_what_it_takes_from_around_it():
     def made(a):
-        return emit.fingerprint(Opaque(lambda t, y: [a * y[0]], dim=1, name="same"))
+        return targets.fingerprint(Opaque(lambda t, y: [a * y[0]], dim=1, name="same"))
 
     assert made(1.0) == made(1.0)
     assert made(1.0) != made(2.0)
-    assert emit.fingerprint(Opaque(numba.njit(in_place), dim=2)) == emit.fingerprint(Opaque(in_place, dim=2))
-    assert emit.fingerprint(Opaque(in_place, dim=2)) != emit.fingerprint(Opaque(parametric, dim=2))
+    assert targets.fingerprint(Opaque(numba.njit(in_place), dim=2)) == targets.fingerprint(
+        Opaque(in_place, dim=2)
+    )
+    assert targets.fingerprint(Opaque(in_place, dim=2)) != targets.fingerprint(Opaque(parametric, dim=2))
 
 
 DECAY = {"rate": np.array([1.0])}
@@ -300,7 +302,7 @@ def rate():
 
 def test_a_fingerprint_follows_from_globals_defaults_and_the_functions_it_calls(monkeypatch):
     def of(f):
-        return emit.fingerprint(Opaque(f, dim=1, name="same"))
+        return targets.fingerprint(Opaque(f, dim=1, name="same"))
 
     def calling(t, y):
         return [-rate() * y[0]]
@@ -363,14 +365,14 @@ def with_rate(t, y, a):
     ],
 )
 def test_a_fingerprint_follows_from_the_object_behind_a_field(one, other):
-    before, after = (emit.fingerprint(Opaque(f, dim=1, name="same")) for f in (one, other))
-    assert before == emit.fingerprint(Opaque(one, dim=1, name="same"))
+    before, after = (targets.fingerprint(Opaque(f, dim=1, name="same")) for f in (one, other))
+    assert before == targets.fingerprint(Opaque(one, dim=1, name="same"))
     assert before != after
 
 
 def test_a_fingerprint_follows_from_every_global_and_every_item(monkeypatch):
     def of(f):
-        return emit.fingerprint(Opaque(f, dim=1, name="same"))
+        return targets.fingerprint(Opaque(f, dim=1, name="same"))
 
     def two(t, y):
         return [-A * B * y[0]]
@@ -394,14 +396,14 @@ def test_a_fingerprint_tells_which_of_two_lists_comes_again():
     one, two = [1.0], [2.0]
 
     def of(*lists):
-        return emit.fingerprint(Opaque(partial(with_rate, a=lists), dim=1, name="same"))
+        return targets.fingerprint(Opaque(partial(with_rate, a=lists), dim=1, name="same"))
 
     assert of(one, two, one) != of(one, two, two)
 
 
 def test_the_field_on_arrays_is_the_function_state_by_state():
     states = np.arange(6.0).reshape(2, 3)
-    field = emit.numpy(WRITTEN["python with parameters"], "field")
-    expected = emit.numpy(TRACED, "field")(0.0, states, np.empty(0))
+    field = targets.numpy(WRITTEN["python with parameters"], "field")
+    expected = targets.numpy(TRACED, "field")(0.0, states, np.empty(0))
     assert np.array_equal(field(0.0, states, np.array([MU])), expected)
     assert np.array_equal(field(0.0, states[:, 0], np.array([MU])), expected[:, 0])

@@ -10,7 +10,7 @@ from integrators.kernel.native import binary, field
 from integrators.kernel.native.engine import KERNEL, Engine
 
 ROOTS = {name: engine._module for name, engine in ENGINES.items()} | {"fields": field.BUILT_BY}
-BESIDE = {"integrators.running.watchdog", "problems.emit.room"}  # what they have is compiled too
+BESIDE = {"integrators.running.watchdog", "problems.targets.room"}  # what they have is compiled too
 
 
 def reached(module):
@@ -43,7 +43,7 @@ def test_an_edit_of_any_module_that_is_imported_makes_another_key(name, monkeypa
 def test_a_key_depends_on_the_kernel_alone(name):
     """Else each edit of a problem would compile the kernel anew."""
     beside = {module for module in reached(ROOTS[name]) if not module.startswith(KERNEL)}
-    assert beside <= BESIDE | {"problems.emit.cache", "problems.locks", "problems.errors"}
+    assert beside <= BESIDE | {"problems.targets.cache", "problems.locks", "problems.errors"}
 
 
 def test_imports_are_those_that_python_executes():

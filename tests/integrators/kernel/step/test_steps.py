@@ -10,7 +10,7 @@ from integrators.kernel import tables
 from integrators.kernel.native import binary, stages
 from integrators.kernel.program import HBVMProgram
 from integrators.protocol import Status
-from problems import Hamiltonian, Problem, VectorField, emit
+from problems import Hamiltonian, Problem, VectorField, targets
 
 wide = np.longdouble
 METHODS = [
@@ -64,7 +64,7 @@ def reference(problem, k, s, h, steps, t0=0.0):
     integrals = t.integrals.hi.astype(wide) + t.integrals.lo
     projection = t.projection.hi.astype(wide) + t.projection.lo
     nodes = t.nodes.hi.astype(wide) + t.nodes.lo
-    source = emit.source(problem.system, "field", "numpy")
+    source = targets.source(problem.system, "field", "numpy")
 
     def f(times, y):
         namespace = {"np": np}
