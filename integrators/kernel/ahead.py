@@ -5,6 +5,7 @@ from multiprocessing import get_context
 
 from integrators.kernel.engines import (
     follow,
+    iterations,
     line,
     look,
     orthonormal,
@@ -16,6 +17,7 @@ from integrators.kernel.engines import (
     steps,
 )
 from integrators.kernel.native import lowered
+from integrators.kernel.routes import FEW_ROWS
 
 ENGINES = {
     "steps": steps,
@@ -29,6 +31,13 @@ ENGINES = {
     "recorded steps": record,
     "adjoints": pull,
 }
+
+FORMS = [
+    (lanes, rows, by_columns)
+    for rows in range(1, FEW_ROWS + 1)
+    for lanes, by_columns in ((8, True), (16, False), (16, True))
+]
+"""Of whole iterations; see `integrators.kernel.step.fused`."""
 
 
 def compile_ahead(processes: int = 1) -> dict[str, float | None]:
@@ -53,7 +62,8 @@ def compile_ahead(processes: int = 1) -> dict[str, float | None]:
 
 def lower() -> None:
     """Write the text of LLVM that every machine of this system can start from, where the package is built."""
-    lowered.write({engine.key: engine.lower() for engine in ENGINES.values()})
+    texts = {engine.key: engine.lower() for engine in ENGINES.values()}
+    lowered.write(texts | {iterations.key(form): iterations.lower(form) for form in FORMS})
 
 
 def _compile(name: str) -> tuple[str, float | None]:

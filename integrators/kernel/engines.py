@@ -3,12 +3,16 @@
 What takes time, importing numba and such a module, is done only where one has to be compiled.
 """
 
+from integrators.kernel.native.around import Around
 from integrators.kernel.native.engine import Engine
 
 steps = Engine(
     "step.entry", "entry", "operation ctx partial between count times targets parts first out budget"
 )
 """``steps(what, ctx, ...)``: see `integrators.kernel.step.entry`."""
+
+iterations = Around("step.fused", "iterations", "context count after")
+"""Whole iterations, for forms (lanes, rows, by columns); see `integrators.kernel.step.fused`."""
 
 solver = Engine("implicit.entry", "entry", "ctx memory started")
 """The implicit solver; its address is what `integrators.kernel.step.solver_switch` calls."""

@@ -10,13 +10,13 @@ from numpy.typing import ArrayLike
 
 from integrators.caveats import FEWEST, detects_discontinuities
 from integrators.events.event import Event
-from integrators.kernel import tables
+from integrators.kernel import routes, tables
 from integrators.kernel.along import batch_along
 from integrators.kernel.batch import Batch, prepare_batch
 from integrators.kernel.batch_events import WithEvents
 from integrators.kernel.breakpoints import Breakpoints
 from integrators.kernel.context import Context, Shape, blocks, width_of_blocks
-from integrators.kernel.engines import look, solver, steps
+from integrators.kernel.engines import iterations, look, solver, steps
 from integrators.kernel.ensemble.prepared import Lanes, compiled_lanes, lanes_of
 from integrators.kernel.events.functions import Action, EventFunction
 from integrators.kernel.fixed import FixedStepper
@@ -31,7 +31,6 @@ from integrators.kernel.parts.implicit import ALWAYS_IMPLICIT
 from integrators.kernel.parts.surfaces import MOST_SURFACES
 from integrators.kernel.simd.emit import WIDTH
 from integrators.kernel.spare import Pair, Spare
-from integrators.kernel.step import fused
 from integrators.kernel.step.rule import (
     LOG_RESIDUAL,
     LOG_RESIDUAL_VARYING,
@@ -183,18 +182,10 @@ class HBVMProgram(Compiled):
 
     def _iterations(self, quantity: targets.Quantity, rows: int, lanes: int) -> binary.Native | None:
         """Return whole iterations for a system with a few rows, if they can be compiled with its field."""
-        if rows > fused.ROWS or self.constants.route not in (8, 16) or not self.lanes:
+        if rows > routes.FEW_ROWS or self.constants.route not in (8, 16) or not self.lanes:
             return None
         by_columns = lanes == WIDTH or machine.many_registers()
-        form = rows, by_columns
-        return fields.compile_around(
-            self.system,
-            quantity,
-            lanes,
-            fused.__name__,
-            form,
-            lambda inner: fused.iterations(inner, lanes, *form),
-        )
+        return iterations.code(self.system, quantity, lanes, (lanes, rows, by_columns))
 
     @property
     def description(self) -> str:

@@ -67,6 +67,24 @@ def _set(context, builder, sig, args, attr):
     builder.store(args[1], _word(context, builder, args[0], slot, _kind(slot)))
 
 
+@intrinsic(prefer_literal=True)
+def load_anew(typing, memory, name):
+    """Return an array of a memory or part by its name (a literal), for a loop to load its numbers anew.
+
+    It would else keep them in registers, which are few, or beside these on the stack.
+    """
+    if not isinstance(name, types.StringLiteral):
+        return None
+    slot = memory.declared.slots[name.literal_value]
+
+    def generate(context, builder, sig, args):
+        word = builder.gep(args[0], [ir.Constant(INTEGER, slot.index)])
+        address = builder.load_atomic(word, "monotonic", 8)
+        return builder.inttoptr(address, context.get_value_type(_kind(slot)))
+
+    return _kind(slot)(memory, name), generate
+
+
 def _names(declared: type[Memory | Part]) -> set[str]:
     """Return the names of all that a memory holds, and its parts."""
     parts = declared.part_of

@@ -38,8 +38,8 @@ def entered(
 ) -> Any:
     """Return the module with an `ENTRY`, which alone is seen from outside."""
     module, inner = lowered
-    entry = around(inner) if around else _entry(inner, [text for _, text in arguments], returns)
-    module.link_in(llvm.parse_assembly(entry))
+    text = around(inner) if around else entry(inner, [text for _, text in arguments], returns)
+    module.link_in(llvm.parse_assembly(text))
     for value in [*module.functions, *module.global_variables]:
         if not value.is_declaration and value.name != ENTRY:
             value.linkage = "internal"
@@ -145,7 +145,7 @@ def _machine() -> Any:
     )
 
 
-def _entry(inner: str, kinds: Sequence[str], returns: str) -> str:
+def entry(inner: str, kinds: Sequence[str], returns: str, name: str = ENTRY) -> str:
     """Write the C function around numba's own calling convention, which returns through a pointer."""
     vectors = [kind.startswith("<") for kind in kinds]
     # What a pointer points to is not reached by the other arguments: values may stay in registers.
@@ -165,7 +165,7 @@ def _entry(inner: str, kinds: Sequence[str], returns: str) -> str:
     result = "  ret void" if returns == "void" else f"  %z = load {returns}, ptr %result\n  ret {returns} %z"
     return f"""
 declare i32 @"{inner}"(ptr, ptr, {", ".join(kinds)})
-define {returns} @{ENTRY}({outer}) {{
+define {returns} @{name}({outer}) {{
   %result = alloca {slot}
   %exception = alloca ptr
 {loads}

@@ -91,11 +91,6 @@ def reduced(builder: Any, pick: Any, value: Any) -> Any:
     return builder.extract_element(value, ir.Constant(ir.IntType(32), 0))
 
 
-def largest_of(builder: Any, value: Any) -> Any:
-    """Return the largest lane of a vector that is not negative; NaN if any lane is."""
-    return reduced(builder, larger_of, value)
-
-
 def text_of(module: ir.Module) -> str:
     """Return a module's text; vectors that its functions keep on the stack lie within one line of the cache.
 

@@ -178,6 +178,20 @@ def strided(typing, address, stride):
     return Numbers(stride.literal_value)(types.intp, stride), generate
 
 
+@intrinsic(prefer_literal=True)
+def as_rows(typing, numbers, lanes):
+    """Return memory of doubles as rows of ``lanes`` (a literal)."""
+    if not isinstance(lanes, types.IntegerLiteral):
+        return None
+    return Rows(lanes.literal_value)(DOUBLES, lanes), lambda context, builder, sig, args: args[0]
+
+
+@intrinsic
+def as_numbers(typing, rows):
+    """Return memory of rows as doubles."""
+    return DOUBLES(rows), lambda context, builder, sig, args: args[0]
+
+
 def _view(kind: Numbers) -> Any:
     @intrinsic
     def view(typing, address):

@@ -4,8 +4,11 @@ import numpy as np
 import pytest
 
 import problems
+from integrators.kernel import routes
+from integrators.kernel.engines import iterations
+from integrators.kernel.native import binary, machine
+from integrators.kernel.native.around import Around
 from integrators.kernel.program import HBVMProgram
-from integrators.kernel.step import fused as whole
 
 CASES = [
     ("kepler", {"k": 8, "s": 8, "h": 0.2}),
@@ -30,10 +33,10 @@ def test_fused_sweeps_make_the_same_bits(name, settings, monkeypatch):
     program = HBVMProgram(problem.system, **settings)
     assert program.contexts()[0].fused != 0
     fused = run(problem, settings, times)
-    other = not whole.machine.many_registers()
-    monkeypatch.setattr(whole.machine, "many_registers", lambda: other)
+    other = not machine.many_registers()
+    monkeypatch.setattr(machine, "many_registers", lambda: other)
     assert run(problem, settings, times)[0].tobytes() == fused[0].tobytes()
-    monkeypatch.setattr(whole, "ROWS", 0)
+    monkeypatch.setattr(routes, "FEW_ROWS", 0)
     assert HBVMProgram(problem.system, **settings).contexts()[0].fused == 0
     alone = run(problem, settings, times)
     assert fused[0].tobytes() == alone[0].tobytes()
@@ -60,3 +63,14 @@ def test_a_step_is_solved_with_the_last_change_still_visible_and_its_effect_remo
     assert max(changes) > 1e-16  # measured 6.8e-14: without the prediction it would have gone on
     energy = problem.errors(stepper.y[None])["energy"].max()
     assert energy < 5e-15  # measured 1.2e-15
+
+
+def test_iterations_are_lowered_once_for_a_form_and_linked_with_each_field(tmp_path, monkeypatch):
+    monkeypatch.setenv("HBVM_BENCH_CACHE", str(tmp_path))
+    monkeypatch.setattr(binary, "_loaded", {})
+    lowered = []
+    lower = Around.lower
+    monkeypatch.setattr(Around, "lower", lambda self, form: lowered.append(form) or lower(self, form))
+    for name in ("henon_heiles", "kepler", "period_annulus"):
+        assert not iterations.code(problems.load(name).system, "field", 8, (8, 4, True)).from_cache
+    assert len(lowered) <= 1  # 0 where the text lies beside the package
