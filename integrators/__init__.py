@@ -22,7 +22,6 @@ from integrators.running.many import integrate_many
 from integrators.running.run import Run, start
 from integrators.running.watch import Progress
 from integrators.solution import Solution
-from problems import deprecated
 
 if TYPE_CHECKING:
     from integrators.coefficients.order import order_of as order_of
@@ -127,19 +126,8 @@ _LATER = {  # imported when first used
     "stability": "integrators.coefficients.order",
 }
 
-_FORMER = {
-    **{name: f"methods.{name}" for name in ("advice", "automatic", "gauss", "hbvm", "line_integral")},
-    **{name: f"coefficients.{name}" for name in ("legendre", "order", "tableau")},
-    **{name: f"running.{name}" for name in ("checkpoints", "integrate", "many", "poincare")},
-    **{name: f"running.{name}" for name in ("times", "watch", "watchdog")},
-    "one_thread": "refusals",
-}
-deprecated.moved(__name__, _FORMER, removed_in="0.2")
-
 
 def __getattr__(name: str) -> Any:
-    if name in _FORMER:
-        return import_module(f"integrators.{name}")
     if name in _LATER:
         return getattr(import_module(_LATER[name]), name)
     if name.startswith("_") or name not in registry.names():

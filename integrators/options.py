@@ -7,7 +7,7 @@ no step, and keeps what is one as a float.
 from collections.abc import Sequence
 from typing import Annotated, Any
 
-from problems import deprecated, limits
+from problems import limits
 from problems.checks import Must, at_least, checked, number, numbers, refusal
 from problems.errors import shown
 
@@ -93,10 +93,3 @@ class _Breakpoints:
 
 Breakpoints = Annotated[Sequence[float], _Breakpoints()]
 """A list or array of times, kept in ascending order; of those that no step could tell apart, the first."""
-
-
-def __getattr__(name: str) -> Any:
-    if name == "Landings":
-        deprecated.renamed("annotation", name, {name: "Breakpoints"}, removed_in="0.2")
-        return Breakpoints
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -73,7 +73,6 @@ from typing import Any, ClassVar, Protocol, cast, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from problems import deprecated
 from problems.checks import CheckedOptions
 from problems.errors import InputError, shown
 from problems.problem import Problem, System, check_is_problem
@@ -113,14 +112,6 @@ __all__ = [
 Array = NDArray[np.float64]
 
 SAMPLINGS = ("partial", "steps", "stop", "dense")
-_FORMER_SAMPLINGS = {"side": "partial", "land": "stop"}
-
-
-def sampling_named(sample: Any) -> Any:
-    """Return the current name of a sampling; the former ``"side"`` and ``"land"`` warn."""
-    if sample is None:
-        return None
-    return deprecated.renamed("sampling", sample, _FORMER_SAMPLINGS, removed_in="0.2")
 
 
 class Status(StrEnum):

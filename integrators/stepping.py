@@ -25,7 +25,6 @@ from integrators.protocol import (
     Stats,
     Status,
     UserError,
-    sampling_named,
     undefined_in,
 )
 from integrators.refusals import (
@@ -158,7 +157,7 @@ class StepperBase:
     @one_thread
     def advance(self, times: ArrayLike, *, sample: str | None = None) -> Samples:
         """Integrate to ``times[-1]``; see the class for the samplings and the protocol for the rest."""
-        how = self.samplings[0] if sample is None else sampling_named(sample)
+        how = self.samplings[0] if sample is None else sample
         if how not in self.samplings:
             raise unknown(f"sampling of {type(self).__name__.removesuffix('Stepper')}", how, self.samplings)
         if how == "stop" and self._is_ahead(times):

@@ -1,8 +1,5 @@
 """Hamiltonian and other systems: every integrator receives the same vector field from one definition."""
 
-from typing import Any
-
-from problems import deprecated
 from problems.bodies import nbody
 from problems.errors import InputError, MissingLibraryError, UnknownNameError
 from problems.problem import Problem
@@ -32,10 +29,3 @@ __all__ = [
     "names",
     "nbody",
 ]
-
-
-def __getattr__(name: str) -> Any:
-    if name == "Foreign":
-        deprecated.renamed("class", name, {name: "Opaque"}, removed_in="0.2")
-        return Opaque
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -26,7 +26,7 @@ from hbvm_bench.campaign.entries import (
 from hbvm_bench.campaign.grid import Grid
 from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.campaign.sweep import PLACEHOLDER, Scalar, combinations, fill, names
-from problems import deprecated, limits
+from problems import limits
 from problems.errors import InputError, unknown
 
 
@@ -258,9 +258,6 @@ def parse(text: str, source: str = "campaign") -> Campaign:
     except RecursionError:
         raise InputError(f"{source}: lists or tables are nested too deep, for a campaign.") from None
     _check_keys(data, Campaign, source)
-    for table in (data, *_tables(data.get("problems"))):
-        for grid in _tables([table.get("grid")]):
-            _warn_of_former_names(grid)
     try:
         return msgspec.convert(data, Campaign)
     except msgspec.ValidationError as error:
@@ -270,11 +267,6 @@ def parse(text: str, source: str = "campaign") -> Campaign:
 
 def _tables(listed: Any) -> list[dict[str, Any]]:
     return [item for item in listed if isinstance(item, dict)] if isinstance(listed, list) else []
-
-
-def _warn_of_former_names(grid: dict[str, Any]) -> None:
-    for key in grid:
-        deprecated.renamed("key of a grid", key, {"own_steps": "at_steps"}, removed_in="0.2")
 
 
 def _check_keys(data: dict[str, Any], struct: type[msgspec.Struct], source: str) -> None:

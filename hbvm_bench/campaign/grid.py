@@ -52,7 +52,7 @@ class Grid(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
         that they cost it nothing in quality, and the end is that of a run without samples,
         the one that is timed.
     own_steps : bool
-        The former name of ``at_steps``, which stored results and older campaign files have.
+        The former name of ``at_steps``, which stored results have.
 
     Without step and count: the problem's own grid, or else 1000 intervals.
     """

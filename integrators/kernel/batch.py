@@ -27,7 +27,7 @@ from integrators.kernel.implicit.workspace import Solver
 from integrators.kernel.pace import Pace
 from integrators.kernel.stepper import HBVMStepper
 from integrators.options import Count
-from integrators.protocol import Array, Samples, Status, Trajectories, UserError, sampling_named, telling
+from integrators.protocol import Array, Samples, Status, Trajectories, UserError, telling
 from integrators.refusals import check_batch, check_times
 from integrators.running.times import Counts, plan
 from problems.checks import checked
@@ -77,7 +77,6 @@ def prepare_batch(
     threads: int = 1,
 ) -> Callable[[], Batch]:
     """Check and allocate; return what integrates every start to all times. See `HBVMProgram.batch`."""
-    sample = sampling_named(sample)
     if sample is not None and (not isinstance(sample, str) or sample not in SAMPLINGS):
         raise unknown("sampling of a batch", sample, SAMPLINGS)
     threads = checked("a batch", "threads", threads, Count)

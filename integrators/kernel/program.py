@@ -45,7 +45,7 @@ from integrators.kernel.step.rule import (
 from integrators.kernel.stepper import HBVMStepper
 from integrators.kernel.tangent.lanes import VectorLanes
 from integrators.kernel.varying import AdaptiveStepper
-from integrators.protocol import Array, Compiled, sampling_named
+from integrators.protocol import Array, Compiled
 from integrators.refusals import check_parameters, check_start, check_state
 from problems import targets
 from problems.analysis.sides import sides
@@ -283,7 +283,6 @@ class HBVMProgram(Compiled):
         problems.errors.InputError
             For starts, parameters or times that cannot be used.
         """
-        sample = sampling_named(sample)
         program = self.program_of_lanes() if sample in (None, "partial") else self
         return prepare_batch(program, Y0, par, times, check_start(t0), sample, threads)()
 

@@ -51,7 +51,6 @@ from integrators.protocol import (
     Stats,
     Status,
     UserError,
-    sampling_named,
     undefined_in,
 )
 from integrators.refusals import check_times, one_thread
@@ -462,7 +461,6 @@ class HBVMStepper(ABC):
     @one_thread
     def advance(self, times: ArrayLike, *, sample: str | None = None) -> Samples:
         """Integrate to ``times[-1]``; see the class for the samplings and the protocol for the rest."""
-        sample = sampling_named(sample)
         if sample is not None and (not isinstance(sample, str) or sample not in SAMPLINGS):
             raise unknown("sampling", sample, SAMPLINGS)
         grid = check_times(times, self.t)

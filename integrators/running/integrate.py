@@ -31,7 +31,6 @@ from integrators.protocol import (
     UserError,
     check_problem,
     offers,
-    sampling_named,
 )
 from integrators.refusals import check_interval, check_times
 from integrators.running.digits import check_digits, pairs
@@ -144,7 +143,6 @@ def integrate(
     if method is None:
         method = registry.create("HBVM")
     check_problem(problem, method)
-    sample = sampling_named(sample)
     if not callable(progress) and not isinstance(progress, bool):
         raise InputError(f"progress={shown(progress)} must be True, False or a function of the progress.")
     if progress is True:

@@ -23,7 +23,6 @@ from integrators.protocol import (
     Trajectories,
     check_problem,
     offers,
-    sampling_named,
 )
 from integrators.reduce import Reducer, Reduction
 from integrators.refusals import check_batch, check_interval, check_times
@@ -168,7 +167,6 @@ def integrate_many(
     if method is None:
         method = registry.create("HBVM")
     check_problem(problem, method)
-    sample = sampling_named(sample)
     if not callable(progress) and not isinstance(progress, bool):
         raise InputError(f"progress={shown(progress)} must be True, False or a function of the progress.")
     system = problem.system

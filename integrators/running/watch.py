@@ -18,13 +18,12 @@ import numpy as np
 
 from integrators.protocol import Array, MethodBase, Stats
 from integrators.solution import write_whole
-from problems import deprecated, targets
+from problems import targets
 from problems.errors import InputError, shown
 from problems.problem import Problem
 from problems.systems.code_digest import code_digest
 
 MAGIC, VERSION = b"hbvm-bench checkpoint ", 2
-FORMER_PROBLEM = "Problem(Foreign("  # as files of versions before 0.2 name one of a `problems.Opaque`
 SOON = 0.1  # seconds from one look to the next, about
 
 
@@ -199,8 +198,6 @@ def read(path: str | os.PathLike[str], wanted: Mapping[str, str]) -> dict[str, A
             f"{where} is a checkpoint of format {version}, and this version reads "
             f"{' and '.join(map(str, READERS))}; resume it with the version that wrote it."
         )
-    if str(stored.get("problem")).startswith(FORMER_PROBLEM):
-        stored["problem"] = stored["problem"].replace(FORMER_PROBLEM, "Problem(Opaque(", 1)
     for key, value in wanted.items():
         if stored.get(key) != value:
             other = f"{stored.get('method')} on {stored.get('problem')}"
@@ -212,11 +209,11 @@ def read(path: str | os.PathLike[str], wanted: Mapping[str, str]) -> dict[str, A
 
 
 class _Unpickler(pickle.Unpickler):
-    """Finds classes whose modules have moved since."""
+    """Finds the class of a checkpoint of format 1, whose module has moved."""
 
     def find_class(self, module: str, name: str) -> Any:
-        """Return a class of a file, by the name that its module has now."""
-        return super().find_class(deprecated.place(module), name)
+        moved = "integrators.running.checkpoints" if module == "integrators.checkpoints" else module
+        return super().find_class(moved, name)
 
 
 READERS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {

@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import integrators
-from integrators import HBVM, Gauss, options, registry, testing
-from integrators.peers.heyoka.taylor import Taylor
+from integrators import HBVM, Gauss, registry, testing
 from integrators.protocol import Status
 from integrators.refusals import check_state, check_times
 from integrators.running.times import plan
@@ -73,23 +72,6 @@ def test_unknown_names_come_with_the_nearest():
         InputError, match=r"LineIntegral needs k, s; give a value as in LineIntegral\(k=...\)"
     ):
         registry.create("LineIntegral", invariants=["energy"])
-
-
-@pytest.mark.parametrize(("former", "present"), [("side", "partial"), ("land", "stop")])
-@pytest.mark.parametrize("method", [HBVM(k=4, s=2, h=0.1), Taylor()], ids=["ours", "heyoka"])
-def test_former_names_of_samplings_are_the_present_ones_and_warn(former, present, method):
-    problem, times = testing.pendulum(), [0.0, 0.25, 0.5]
-    expected = integrators.integrate(problem, method, times, sample=present).y
-    with pytest.warns(DeprecationWarning, match=f"sampling '{former}' is now called '{present}'"):
-        assert np.array_equal(integrators.integrate(problem, method, times, sample=former).y, expected)
-    stepper = method.compile(problem.system).start(problem.y0, problem.par)
-    with pytest.warns(DeprecationWarning, match=f"'{present}'"):
-        assert np.array_equal(stepper.advance(np.array(times), sample=former).y, expected)
-
-
-def test_the_former_name_of_the_annotation_of_breakpoints_warns():
-    with pytest.warns(DeprecationWarning, match="'Landings' is now called 'Breakpoints'"):
-        assert options.Landings is options.Breakpoints
 
 
 def test_integrate_says_what_is_wrong_with_its_arguments():

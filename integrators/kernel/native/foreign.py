@@ -17,9 +17,9 @@ from integrators.kernel.native.field import compile_field
 from integrators.kernel.native.stages import ONE_BY_ONE
 from problems import targets
 from problems.systems.base import System
-from problems.systems.untraced import Foreign
+from problems.systems.opaque import Opaque
 
-_functions: WeakKeyDictionary[Foreign, dict[int, tuple[int, Any]]] = WeakKeyDictionary()
+_functions: WeakKeyDictionary[Opaque, dict[int, tuple[int, Any]]] = WeakKeyDictionary()
 """The address of each field by lanes, and the function that it is of: as long as its system is there."""
 
 
@@ -33,7 +33,7 @@ def field_of(system: System, quantity: targets.Quantity, lanes: int) -> binary.N
     numba.NumbaError
         If a numba function cannot be compiled for arrays of numbers.
     """
-    if not isinstance(system, Foreign) or quantity != "field":
+    if not isinstance(system, Opaque) or quantity != "field":
         return compile_field(system, quantity, lanes)
     started = perf_counter()
     with binary.lock:  # two of them would leave one thread with the address of what the other throws away
@@ -46,7 +46,7 @@ def field_of(system: System, quantity: targets.Quantity, lanes: int) -> binary.N
     return binary.Native(address, ONE_BY_ONE, known, seconds, not system.numba, (system, function))
 
 
-def _compiled(system: Foreign, lanes: int) -> tuple[int, Any]:
+def _compiled(system: Opaque, lanes: int) -> tuple[int, Any]:
     """Return the address of a numba field on stage memory, and the function."""
     import numba
     from numba import types
@@ -112,7 +112,7 @@ def _compiled(system: Foreign, lanes: int) -> tuple[int, Any]:
     return address, function
 
 
-def _called(system: Foreign, lanes: int) -> tuple[int, Any]:
+def _called(system: Opaque, lanes: int) -> tuple[int, Any]:
     """Return the address of a callback to a Python field, and the callback."""
     dim, size = system.dim, system.n_par
     owner = ref(system)  # which holds this callback, not the other way round

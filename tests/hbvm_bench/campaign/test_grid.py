@@ -5,7 +5,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import problems
-from hbvm_bench.campaign.file import parse
 from hbvm_bench.campaign.grid import Grid
 from hbvm_bench.reference import solutions
 from problems.errors import InputError
@@ -84,18 +83,3 @@ def test_stored_grids_have_the_former_name_of_at_steps():
     stored = msgspec.convert({"count": 40, "own_steps": True}, Grid)
     assert stored == Grid(count=40, at_steps=True)
     assert msgspec.to_builtins(stored) == {"count": 40, "at_steps": True}
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        'problems = ["pendulum()"]\n[[methods]]\nuse = "HBVM()"\n[grid]\nown_steps = true\n',
-        '[[problems]]\nuse = "pendulum()"\n[problems.grid]\nown_steps = true\n[[methods]]\nuse = "HBVM()"\n',
-    ],
-)
-def test_a_campaign_file_with_the_former_name_warns_and_has_the_same_cases(text):
-    text = 'name = "former"\n' + text
-    with pytest.warns(DeprecationWarning, match="'own_steps' is now called 'at_steps'"):
-        former = parse(text)
-    assert former.cases() == parse(text.replace("own_steps", "at_steps")).cases()
-    assert former.cases()[0].grid == Grid(at_steps=True)
