@@ -148,7 +148,7 @@ def test_the_command_inspects_formulas_and_problems(capsys):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["inspect", "q.real"], "column 1"),
+        (["inspect", "q.real"], "`q.real` is not allowed"),
         (["inspect", "kepler(e=2)"], "e=2 of kepler must be an eccentricity"),
         (["inspect", "kepler", "--par", "k=2"], "parameters belong to formulas"),
         (["inspect", "p^2/2 + k*q"], "contains 'k', which has no value"),

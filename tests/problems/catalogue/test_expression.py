@@ -17,7 +17,6 @@ from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.run import loop
 from problems import targets
 from problems.analysis import structure
-from problems.catalogue import _formula as formula
 from problems.catalogue import expression
 from problems.errors import InputError
 from problems.graph.arguments import Mathematics
@@ -32,7 +31,7 @@ def _watch(event: str, arguments: tuple) -> None:
 
 
 sys.addaudithook(_watch)  # cannot be taken off again; asleep unless a test wakes it
-for _file in (__file__, formula.__file__):  # messages quote lines: read now, not while it is watched
+for _file in (__file__, expression.__file__):  # messages quote lines: read now, not while it is watched
     linecache.getlines(_file)
 
 
@@ -43,12 +42,12 @@ def _outcome(text: str):
     symbols = Mathematics(graph)
     _watched = []
     try:
-        read = formula.Formula(text)
+        read = expression.Formula(text)
         read.value(lambda word: graph.symbol("par", hash(word), flags=PAR), symbols)
     except InputError as error:
         message = str(error)
         assert "\n" not in message
-        assert "column" in message or "too long" in message or "empty" in message
+        assert "cannot read the formula" in message or "too long" in message or "empty" in message
         return None
     finally:
         seen, _watched = _watched, None
@@ -78,7 +77,7 @@ def fuzz(few, many):
 
 
 @fuzz(500, 4500)
-def test_any_mixture_of_pieces_is_read_or_refused_with_its_column(examples):
+def test_any_mixture_of_pieces_is_read_or_refused_with_its_part(examples):
     @settings(FUZZ, max_examples=examples)
     @given(st.lists(PIECES, max_size=14).map("".join))
     def check(text):
@@ -88,7 +87,7 @@ def test_any_mixture_of_pieces_is_read_or_refused_with_its_column(examples):
 
 
 @fuzz(300, 3000)
-def test_any_text_is_read_or_refused_with_its_column(examples):
+def test_any_text_is_read_or_refused_with_its_part(examples):
     @settings(FUZZ, max_examples=examples)
     @given(st.text(max_size=60))
     def check(text):
@@ -153,61 +152,51 @@ def test_a_formula_means_what_it_says(examples):
 
 
 @pytest.mark.parametrize(
-    ("text", "column", "reason"),
+    ("text", "reason"),
     [
-        ("__import__('os').system('true')", 1, "only functions by name"),
-        ("q + __import__('os')", 5, "unknown function '__import__'"),
-        ("q.__class__", 1, "a dot after a name"),
-        ("p^2/2 + q.real", 9, "a dot after a name"),
-        ("eval('1')", 1, "unknown function 'eval'"),
-        ("[q for q in p]", 1, "a comprehension"),
-        ("{q for q in p}", 1, "a comprehension"),
-        ("sum(q for q in p)", 1, "unknown function 'sum'"),
-        ("(lambda: q)()", 1, "only functions by name"),
-        ("lambda q: p", 1, "a lambda"),
-        ("p^2 + (q if q else p)", 8, "a condition"),
-        ("q[0]", 1, "an index in brackets"),
-        ("q < p", 1, "a comparison"),
-        ("q and p", 1, "and/or"),
-        ("not q", 1, "this is not allowed"),
-        ("q % 2", 1, "only + - * / and powers"),
-        ("q // 2", 1, "only + - * / and powers"),
-        ("q @ p", 3, "'@' has no meaning"),
-        ("(q := 2)", 5, "'=' has no meaning"),
-        ("q; p", 2, "';' has no meaning"),
-        ("q # comment", 3, "'#' has no meaning"),
-        ("'text' + q", 1, "text or a complex number"),
-        ("1j*q", 1, "text or a complex number"),
-        ("f'{q}'", 1, "not allowed in a formula"),
-        ("True*q", 1, "True and False"),
-        ("sin(q, p)", 1, "sin takes one argument"),
-        ("sin(x=q)", 6, "'=' has no meaning"),
-        ("sin*q", 1, "sin needs an argument"),
-        ("sinn(q)", 1, "did you mean 'sin'"),
-        ("q^100000", 3, "the power is larger than 100"),
-        ("q^(10^9)", 4, "the power is larger than 100"),
-        ("p^2 + q^9^9^9", 11, "the power is larger than 100"),
-        ("q^2.3", 3, "integer or half an integer"),
-        ("2^p", 3, "an exponent must be a number"),
-        ("p^2/2 + 1/0", 11, "divides by 0"),
-        ("q + log(-1)", 5, "not a number that a double can hold"),
-        ("q*1e999", 3, "not a number that a double can hold"),
-        ("q*" + "9" * 400, 3, "not a number that a double can hold"),
-        ("10^100*10^100*10^100*10^100*q", 1, "not a number that a double can hold"),
-        ("2 q", 3, "write products with *"),
-        ("p^2/2 +", 7, "not a formula"),
-        ("q²", 2, "has no meaning"),
-        ("   q$", 5, "not a formula"),
-        ("sin(" * 70 + "q" + ")" * 70, 245, "nested deeper than 60"),
-        ("(" * 3000 + "q" + ")" * 900, 200, "not a formula"),
+        ("__import__('os').system('true')", "system('true')` is not allowed"),
+        ("q + __import__('os')", "calls an unknown function '__import__'"),
+        ("q + __import__(q)", "unknown function '__import__'"),
+        ("q.__class__", "`q.__class__` is not allowed"),
+        ("p^2/2 + q.real", "`q.real` is not allowed; a formula has numbers"),
+        ("eval('1')", "unknown function 'eval'"),
+        ("[q for q in p]", "is not allowed"),
+        ("sum(q for q in p)", "unknown function 'sum'"),
+        ("(lambda: q)()", "is not allowed"),
+        ("p^2 + (q if q else p)", "`q if q else p` is not allowed"),
+        ("q[0]", "`q[0]` is not allowed"),
+        ("q < p", "is not allowed"),
+        ("q and p", "is not allowed"),
+        ("not q", "is not allowed"),
+        ("q @ p", "`q @ p` is not allowed"),
+        ("(q := 2)", "is not allowed"),
+        ("q; p", "it is not an expression"),
+        ("1j*q", "`1j` is not allowed"),
+        ("f'{q}'", "is not allowed"),
+        ("True*q", "`True` is not allowed"),
+        ("sin(q, p)", "`sin(q, p)` is wrong: sin takes 1 argument."),
+        ("atan2(q)", "atan2 takes 2 arguments"),
+        ("sin(x=q)", "is not allowed"),
+        ("sin*q", "`sin` needs an argument"),
+        ("sinn(q)", "did you mean 'sin'"),
+        ("p^2 + q^9^9^9", "`9 ^ 9 ^ 9` is not a number that a double can hold"),
+        ("q + (-8)^0.5", "is not a number that a double can hold"),
+        ("p^2/2 + 1/0", "`1 / 0` divides by 0"),
+        ("q + log(-1)", "`log(-1)` is not a number that a double can hold"),
+        ("q*1e999", "not a number that a double can hold"),
+        ("q*" + "9" * 400, "not a number that a double can hold"),
+        ("10^100*10^100*10^100*10^100*q", "not a number that a double can hold"),
+        ("2 q", "write products with *"),
+        ("p^2/2 +", "it is not an expression"),
+        ("q²", "it is not an expression"),
+        ("   q$", "it is not an expression"),
+        ("(" * 1500 + "q" + ")" * 1500, "it is not an expression"),
     ],
 )
-def test_what_is_not_a_formula_is_refused_with_its_column(text, column, reason):
+def test_what_is_not_a_formula_is_refused_with_its_part(text, reason):
     with pytest.raises(InputError) as caught:
         expression.hamiltonian(text)
     assert reason in str(caught.value)
-    if len(text) < 1000:
-        assert f"(column {column})" in str(caught.value)
 
 
 def test_lengths_and_numbers_of_coordinates_are_bounded():
@@ -229,7 +218,7 @@ def test_lengths_and_numbers_of_coordinates_are_bounded():
         ("3 + k", {"k": 1.0}, "contains no coordinate"),
         ("p^2/2", {"mass": 1.0}, "unknown parameter, not in the formula, 'mass'"),
         ("1e308*q^50", {}, "a double cannot hold"),
-        ("1e308*(2*(1e308*q))", {}, "the constant inf is not finite; use finite numbers only (column 8)"),
+        ("1e308*(2*(1e308*q))", {}, "the constant inf is not finite; use finite numbers only."),
     ],
 )
 def test_what_is_missing_is_named(text, parameters, reason):
@@ -242,6 +231,13 @@ def test_powers_bind_as_in_mathematics():
     value = targets.numpy(system, "hamiltonian")(0.0, np.array([3.0, 4.0]), system.pack())[0]
     assert value == pytest.approx(-9.0 + 0.5 + 2.0 - math.sqrt(2) * 3)
     assert expression.hamiltonian("p1^2/2 + q2").dof == 2
+
+
+def test_formulas_have_the_operators_of_python_and_functions_of_two_arguments():
+    system = expression.hamiltonian("p^2/2 + (2 + q^2)^0.3 + 2^q + q % 3 + atan2(q, p)")
+    value = targets.numpy(system, "hamiltonian")(0.0, np.array([1.3, 0.4]), system.pack())[0]
+    expected = 0.08 + 3.69**0.3 + 2**1.3 + 1.3 + math.atan2(1.3, 0.4)
+    assert value == pytest.approx(expected, rel=1e-14)  # measured 2e-16
 
 
 def test_time_and_parameters_and_invariants_can_be_given_as_text():
@@ -302,5 +298,5 @@ use = "HBVM(k=4, s=2, h=0.1)"
     assert case.problem.system.separable
     assert case.problem.par.tolist() == [2.0]
     file.write_text(file.read_text().replace("p^2/2", "p.x"))
-    with pytest.raises(InputError, match="column"):
+    with pytest.raises(InputError, match=r"`p\.x` is not allowed"):
         loop.plan(campaign.load(str(file)))
