@@ -38,6 +38,7 @@ from typing import (
 )
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from problems.errors import InputError, shown, unknown
 from problems.quantities import refuse_more_than_numbers
@@ -344,39 +345,6 @@ class Arguments:
             call[key] = value if key in self._free else self._used(key, value)
         return call
 
-    @functools.cached_property
-    def _converted(self) -> dict[str, Any]:
-        """The defaults that a call gets in another form than they are written in."""
-        return {
-            key: value for key, value in self._unchecked.items() if value is not self.parameters[key].default
-        }
-
-    @functools.cached_property
-    def _as_given(self) -> int:
-        """So many values by place, and none by name, go to the function as they are; -1: none do."""
-        if self._converted:
-            return -1
-        return next((n for n, key in enumerate(self._by_place) if key not in self._free), len(self._by_place))
-
-    def given(
-        self, values: Sequence[Any], options: Mapping[str, Any]
-    ) -> tuple[Sequence[Any], Mapping[str, Any]]:
-        """Return what a call gives by place and by name, checked as by `bind`; Python knows the defaults."""
-        if not options and self._enough <= len(values) <= self._as_given:
-            return values, options
-        self.check_names(values, options)
-        free, placed, named = self._free, list(values), dict(options)
-        for place, key in enumerate(self._by_place[: len(placed)]):
-            if key not in free:
-                placed[place] = self._used(key, placed[place])
-        for key in options:
-            if key not in free:
-                named[key] = self._used(key, named[key])
-        for key, value in self._converted.items():
-            if key not in options and key not in self._by_place[: len(values)]:
-                named[key] = value
-        return placed, named
-
     def printed(self, values: Mapping[str, Any], first: Iterable[str] = ()) -> dict[str, Any]:
         """Return what a call is printed with: ``first``, then what differs from its default."""
         changed = (
@@ -420,31 +388,72 @@ def _checking(function: Callable[P, R], owner: str | None) -> Callable[P, R]:
     @functools.wraps(function)
     def wrapper(*values: P.args, **options: P.kwargs) -> R:
         taken = arguments(type(values[0]).__name__ if makes else function.__name__)
-        by_place, by_name = taken.given(values[bound:], options)
-        return function(*values[:bound], *by_place, **by_name)  # type: ignore[call-arg]
+        return function(*values[:bound], **taken.bind(values[bound:], options))  # type: ignore[call-arg]
 
     return readable(wrapper)
 
 
 def readable(described: Described) -> Described:
-    """Let ``help`` show the names and defaults of a function or class; its docstring has the types."""
-    described.__signature__ = _without_types(inspect.signature(described))
+    """Let ``help`` show the types of a function or class by their names."""
+    described.__signature__ = _shown(inspect.signature(described))
     return described
 
 
-def _without_types(signature: inspect.Signature) -> inspect.Signature:
-    plain = [
-        parameter.replace(annotation=EMPTY, default={} if parameter.default is NOTHING else parameter.default)
+def _shown(signature: inspect.Signature) -> inspect.Signature:
+    """Return a signature with the names of types, and without what must hold of the values."""
+    parameters = [
+        parameter.replace(
+            annotation=EMPTY if parameter.annotation is EMPTY else _Name(parameter.annotation),
+            default={} if parameter.default is NOTHING else parameter.default,
+        )
         for parameter in signature.parameters.values()
     ]
-    return signature.replace(parameters=plain, return_annotation=EMPTY)
+    returned = signature.return_annotation
+    return signature.replace(
+        parameters=parameters, return_annotation=EMPTY if returned is EMPTY else _Name(returned)
+    )
 
 
-class _Readable:
-    """What ``help`` shows of a class: its options and their defaults; the docstring has the types."""
+class _Name:
+    """A type as ``help`` writes it: ``float | None``, ``Sequence[float]``, ``ArrayLike``."""
+
+    def __init__(self, annotation: Any) -> None:
+        self._text = _named(annotation)
+
+    def __repr__(self) -> str:
+        return self._text
+
+
+_ARRAY_LIKE = frozenset(get_args(ArrayLike))
+
+
+def _named(annotation: Any) -> str:
+    if isinstance(annotation, list):  # the arguments of a Callable
+        return f"[{', '.join(map(_named, annotation))}]"
+    origin, parts = get_origin(annotation), get_args(annotation)
+    if annotation is None or annotation is NoneType:
+        return "None"
+    if origin is Annotated:
+        return _named(parts[0])
+    if origin in (Union, UnionType):
+        like = _ARRAY_LIKE.issubset(parts)
+        rest = [part for part in parts if not like or part not in _ARRAY_LIKE]
+        return " | ".join(["ArrayLike"] * like + [_named(part) for part in rest])
+    if origin is Literal:
+        return f"Literal[{', '.join(map(repr, parts))}]"
+    if origin is np.ndarray:
+        return "ndarray"
+    if origin is not None:
+        inner = ", ".join("..." if part is ... else _named(part) for part in parts)
+        return f"{origin.__name__}[{inner}]"
+    return annotation if isinstance(annotation, str) else getattr(annotation, "__name__", repr(annotation))
+
+
+class _OfFields:
+    """The signature of a class of options: its fields, with their types and defaults."""
 
     def __get__(self, instance: object, cls: type) -> inspect.Signature:
-        return _without_types(_signature(cls))
+        return _shown(_signature(cls))
 
 
 class CheckedOptions:
@@ -455,7 +464,7 @@ class CheckedOptions:
     """
 
     _owner: ClassVar[str | None] = None
-    __signature__ = _Readable()
+    __signature__ = _OfFields()
 
     def __new__(cls, *values: Any, **options: Any) -> Self:
         _of_fields(cls).check_names(values, options)

@@ -342,8 +342,13 @@ def test_methods_are_copied_and_pickled(method):
     assert dataclasses.replace(method, s=3).s == 3
 
 
-def test_a_signature_is_the_options():
-    assert str(inspect.signature(Gauss)).startswith("(*, s, h=None, tol=None, ")
+def test_help_shows_the_options_and_their_types():
+    assert str(inspect.signature(Gauss)).startswith("(*, s: int, h: float | None = None, tol: float | None")
+    shown = str(inspect.signature(integrators.integrate))
+    assert "times: ArrayLike | None = None" in shown
+    assert "checkpoint: str | PathLike[str] | None = None" in shown
+    assert "progress: bool | Callable[[Progress], object] = False" in shown
+    assert shown.endswith(" -> Solution")
 
 
 @pytest.mark.parametrize(
@@ -359,8 +364,8 @@ def test_help_is_for_reading(public):
     assert "<function" not in text
     assert "object at 0x" not in text
     call = next(line for line in text.splitlines() if f"{public.__name__}(" in line and "class" not in line)
-    assert len(call) < 240  # integrate_many has 229
-    assert "Annotated" not in call
+    assert len(call) < 700  # integrate_many has 597
+    assert not [word for word in ("Annotated", "numpy.", "typing.", "<class") if word in call]
 
 
 def test_a_limit_can_be_raised(monkeypatch):

@@ -159,22 +159,17 @@ load('period_annulus', b=[nan, 0, 0, 0])                     | b=[nan, 0, 0, 0] 
 load('period_annulus', c='abcd')                             | c='abcd' of period_annulus must be a list of
 load('expression', H=3)                                      | H=3 of expression must be text, such as
 load('expression', H='')                                     | an empty formula; write one such as "p^2/2 -
-load('expression', H='p^2/2 +')                              | cannot read the formula 'p^2/2 +': this is
-load('expression', H='p^2/2 - cos(q')                        | cannot read the formula 'p^2/2 - cos(q': this
+load('expression', H='p^2/2 +')                              | cannot read the formula 'p^2/2 +': it is
+load('expression', H='p^2/2 - cos(q')                        | cannot read the formula 'p^2/2 - cos(q': it
 load('expression', H='p^2/2 - cosine(q)')                    | cannot read the formula 'p^2/2 - cosine(q)':
 load('expression', H='p^2/2 + z')                            | the formula 'p^2/2 + z' contains 'z', which
-load('expression', H='import os')                            | cannot read the formula 'import os': this is
-load('expression', H='p^2/2 + q**q')                         | cannot read the formula 'p^2/2 + q**q': an
-load('expression', H='p^2/2 + 1/0')                          | cannot read the formula 'p^2/2 + 1/0': this
+load('expression', H='import os')                            | cannot read the formula 'import os': it is
+load('expression', H='p^2/2 + 1/0')                          | cannot read the formula 'p^2/2 + 1/0': `1 / 0`
 load('expression', H='1')                                    | the formula '1' contains no coordinate; use q
 load('expression', H=None)                                   | H=None of expression must be text, such as
 load('expression', H='(' * 3000)                             | cannot read the formula
 load('expression', H='('*300 + 'q' + ')'*300)                | cannot read the formula
 load('expression', H='q' + '+q'*50000)                       | a formula of 100001 characters is too long;
-load('expression', H='q^' * 200 + '2')                       | cannot read the formula
-load('expression', H='q^1e9')                                | cannot read the formula 'q^1e9': the power is
-load('expression', H='q^1000000000')                         | cannot read the formula 'q^1000000000': the
-load('expression', H='q^(1/3)')                              | cannot read the formula 'q^(1/3)': an
 load('expression', H='p9999999^2/2 + q9999999')              | the formula 'p9999999^2/2 + q9999999' has
 load('expression', H='p2^2/2 + q2', q0=[1], p0=[2])          | q0=[1.0] of expression must be a list of 2
 load('expression', q0='a')                                   | q0='a' of expression must be a list of
