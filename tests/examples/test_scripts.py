@@ -20,6 +20,7 @@ SAYS = {
     "star_cluster.py": ["accurate: HBVM(), REBOUND's IAS15\n"],
     "plugin.py": ["accurate: HBVM, SciPy's DOP853"],
     "fit.py": ["accurate: HBVM(tol=1e-10), variations, diffrax's Dopri8, jacfwd"],
+    "radial_velocities.py": ["accurate: HBVM(tol=1e-10), states, diffrax's Dopri8, reverse"],
     "impacts.py": ["104 impacts", "accurate: HBVM(), Event(then=...), heyoka, callbacks"],
     "short.py": ["accurate: HBVM(tol=1e-12), heyoka, SciPy's DOP853"],
     "molecular_dynamics.py": ["accurate: HBVM(k=4, s=2, h=0.005), Verlet"],
