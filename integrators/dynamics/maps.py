@@ -1,17 +1,13 @@
 """Indicators of chaos, and Lyapunov exponents, over many initial conditions or parameters."""
 
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import nullcontext, suppress
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from integrators import registry
 from integrators.dynamics.divergence import Divergence
 from integrators.dynamics.indicators import (
     SAMPLES,
@@ -31,15 +27,15 @@ from integrators.dynamics.lyapunov import (
     exponents_of,
     interval_ends,
 )
+from integrators.dynamics.many import Many, OnTheWay, Outcome, Outcomes
 from integrators.dynamics.together import Together
 from integrators.dynamics.vectors import random_vectors, sampling_times
 from integrators.options import Count
-from integrators.protocol import Array, MethodBase, Status, check_problem
+from integrators.protocol import Array, MethodBase, Status
 from integrators.running.integrate import SECONDS, NotNegative
-from integrators.running.many import members
-from integrators.running.watch import Bar, Report, Watch, identity, read
+from integrators.running.watch import Report
 from problems.checks import NOTHING, File, Named, Word, at_least, checked_arguments
-from problems.errors import InputError, shown, unknown
+from problems.errors import InputError, unknown
 from problems.problem import Problem
 
 INDICATORS: dict[str, Callable[..., Indicator]] = {
@@ -50,35 +46,23 @@ INDICATORS: dict[str, Callable[..., Indicator]] = {
 }
 
 
-@dataclass(frozen=True, eq=False)
-class IndicatorMap:
-    """An indicator of many trajectories.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Map:
+    """What maps have in common: how the trajectories ended, and a picture."""
 
-    Attributes
-    ----------
-    values : ndarray, shape (n,)
-        The indicator at the end of each; NaN if the integration failed.
-    status : list of Status
-        How each ended.
-    reason : list of str
-        A sentence on each failure, else empty.
-    starts : ndarray, shape (n, dim)
-        Their initial conditions.
-    par : ndarray, shape (n, n_par)
-        Their parameters.
-    warning : str
-        Why the last checkpoint was not written, if it was not.
-    """
-
-    values: Array
     status: list[Status]
     reason: list[str]
     starts: Array
     par: Array
     warning: str
 
+    @property
+    def _drawn(self) -> Array:
+        """One value of each trajectory."""
+        raise NotImplementedError
+
     def draw(self, x: ArrayLike, y: ArrayLike, axes: Any = None, **options: Any) -> Any:
-        """Draw the values over a grid with matplotlib.
+        """Draw the values, or the largest exponents, over a grid with matplotlib.
 
         Parameters
         ----------
@@ -99,21 +83,27 @@ class IndicatorMap:
         problems.errors.InputError
             If the grid has another number of points.
         """
-        return _drawn(self.values, x, y, axes, options)
+        across, up = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
+        if across.ndim != 1 or up.ndim != 1 or across.size * up.size != len(self.status):
+            raise InputError(
+                f"a grid of shapes {across.shape} and {up.shape} does not have the {len(self.status)} points "
+                "of the map."
+            )
+        import matplotlib.pyplot as plt  # only who draws waits for it
+
+        axes = plt.gca() if axes is None else axes
+        grid = self._drawn.reshape(across.size, up.size).T
+        return axes.pcolormesh(across, up, grid, **{"shading": "nearest", "rasterized": True, **options})
 
 
-@dataclass(frozen=True, eq=False)
-class ExponentMap:
-    """Lyapunov exponents of many trajectories.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class IndicatorMap(_Map):
+    """An indicator of many trajectories.
 
     Attributes
     ----------
-    exponents : ndarray, shape (n, count)
-        Of each, in 1/time, the largest first; NaN if the integration failed.
-    intervals : ndarray, shape (n, count, 2)
-        Each with 95 % confidence, or a bound of convergence, as in `Exponents`.
-    sum, divergence, pairs : ndarray, shape (n,)
-        As in `Exponents`; NaN where that has ``None``.
+    values : ndarray, shape (n,)
+        The indicator at the end of each; NaN if the integration failed.
     status : list of Status
         How each ended.
     reason : list of str
@@ -126,34 +116,38 @@ class ExponentMap:
         Why the last checkpoint was not written, if it was not.
     """
 
+    values: Array
+
+    @property
+    def _drawn(self) -> Array:
+        return self.values
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ExponentMap(_Map):
+    """Lyapunov exponents of many trajectories.
+
+    Attributes
+    ----------
+    exponents : ndarray, shape (n, count)
+        Of each, in 1/time, the largest first; NaN if the integration failed.
+    intervals : ndarray, shape (n, count, 2)
+        Each with 95 % confidence, or a bound of convergence, as in `Exponents`.
+    sum, divergence, pairs : ndarray, shape (n,)
+        As in `Exponents`; NaN where that has ``None``.
+    status, reason, starts, par, warning
+        As in `IndicatorMap`.
+    """
+
     exponents: Array
     intervals: Array
     sum: Array
     divergence: Array
     pairs: Array
-    status: list[Status]
-    reason: list[str]
-    starts: Array
-    par: Array
-    warning: str
 
-    def draw(self, x: ArrayLike, y: ArrayLike, axes: Any = None, **options: Any) -> Any:
-        """Draw the largest exponents over a grid; see `IndicatorMap.draw`."""
-        return _drawn(self.exponents[:, 0], x, y, axes, options)
-
-
-def _drawn(values: Array, x: ArrayLike, y: ArrayLike, axes: Any, options: Mapping[str, Any]) -> Any:
-    across, up = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
-    if across.ndim != 1 or up.ndim != 1 or across.size * up.size != values.size:
-        raise InputError(
-            f"a grid of shapes {across.shape} and {up.shape} does not have the {values.size} points of the "
-            "map."
-        )
-    import matplotlib.pyplot as plt  # only who draws waits for it
-
-    axes = plt.gca() if axes is None else axes
-    grid = values.reshape(across.size, up.size).T
-    return axes.pcolormesh(across, up, grid, **{"shading": "nearest", "rasterized": True, **options})
+    @property
+    def _drawn(self) -> Array:
+        return self.exponents[:, 0]
 
 
 @checked_arguments
@@ -233,26 +227,19 @@ def indicator_map(
     >>> (found.values > 1e-6).tolist()
     [True, False]
     """
-    method = registry.create("HBVM") if method is None else method
-    check_problem(problem, method)
     if indicator not in INDICATORS:
         raise unknown("indicator", indicator, tuple(INDICATORS))
     if k is not None and indicator != "gali":
         raise InputError(f"k={k} is the order of indicator='gali'; leave it out for {indicator!r}.")
     options: dict[str, Any] = {"t_end": t_end, "samples": samples} | ({} if k is None else {"k": k})
-    rows, par = members("indicator_map", problem, starts, parameters)
-    belongs = identity(problem, method, _told(rows, par), f"{indicator} {options}", {})
-    loop = _Loop(threads, progress, checkpoint, every_seconds, resume, belongs)
-    together = Together(problem, method, random_vectors(problem.system.dim, 1), threads)
-    if indicator == "megno" and together.available:
-        times = _all_steps(problem, method, t_end)
-        state, failure = loop.over(
-            rows, par, partial(_megno, together, problem.t0, times), (), together.piece
-        )
-    else:
-        value = partial(_indicator, INDICATORS[indicator], method, options)
-        state, failure = loop.one_by_one(problem, rows, par, value, ())
-    return IndicatorMap(state["values"], state["status"], state["reason"], rows, par, failure)
+    many = Many.of("indicator_map", problem, method, starts, parameters, threads)
+    in_lanes = partial(_megno, many, t_end) if indicator == "megno" else None
+    state, warning = many.followed(
+        f"{indicator} {options}", (), random_vectors(problem.system.dim, 1), in_lanes,
+        partial(_indicator, INDICATORS[indicator], many.method, options),
+        OnTheWay(progress, checkpoint, every_seconds, resume),
+    )  # fmt: skip
+    return IndicatorMap(values=state["values"], **many.ends(state), warning=warning)
 
 
 @checked_arguments
@@ -353,21 +340,14 @@ def lyapunov_map(
     >>> (found.intervals[:, 0, 0] > 0.0).tolist()
     [False, True]
     """
-    method = registry.create("HBVM") if method is None else method
-    check_problem(problem, method)
     n, end = checked_span(problem, count, t_end, skip)
-    rows, par = members("lyapunov_map", problem, starts, parameters)
-    belongs = identity(problem, method, _told(rows, par), f"lyapunov {(n, end, skip)}", {})
-    loop, shape = _Loop(threads, progress, checkpoint, every_seconds, resume, belongs), (3 * n + 3,)
-    vectors = canonical_frame(problem.system.dim, problem.system.dof)[:, :n]
-    together = Together(problem, method, vectors, threads)
-    if n < problem.system.dim and together.available:
-        state, failure = loop.over(
-            rows, par, partial(_largest, together, problem, end, skip, n), shape, together.piece
-        )
-    else:
-        value = partial(_exponents, method, n, end, skip)
-        state, failure = loop.one_by_one(problem, rows, par, value, shape)
+    many = Many.of("lyapunov_map", problem, method, starts, parameters, threads)
+    in_lanes = partial(_largest, many, end, skip, n) if n < problem.system.dim else None
+    state, warning = many.followed(
+        f"lyapunov {(n, end, skip)}", (3 * n + 3,),
+        canonical_frame(problem.system.dim, problem.system.dof)[:, :n], in_lanes,
+        partial(_exponents, many.method, n, end, skip), OnTheWay(progress, checkpoint, every_seconds, resume),
+    )  # fmt: skip
     exponents, low, high, checks = np.split(state["values"], [n, 2 * n, 3 * n], axis=1)
     return ExponentMap(
         exponents=exponents,
@@ -375,108 +355,9 @@ def lyapunov_map(
         sum=checks[:, 0],
         divergence=checks[:, 1],
         pairs=checks[:, 2],
-        status=state["status"],
-        reason=state["reason"],
-        starts=rows,
-        par=par,
-        warning=failure,
+        **many.ends(state),
+        warning=warning,
     )
-
-
-Outcome = tuple[ArrayLike, Status, str, int]
-"""The values of one trajectory, how it ended with the reason, and how many steps it took."""
-Outcomes = tuple[Any, Sequence[Status], Sequence[str], Any]
-"""The same of several."""
-
-
-@dataclass(frozen=True)
-class _Loop:
-    """How many trajectories are followed: the arguments that every map has, and what its file belongs to."""
-
-    threads: int
-    progress: bool | Report
-    checkpoint: Any
-    every_seconds: float
-    resume: Any
-    belongs: Mapping[str, str]
-
-    def one_by_one(
-        self,
-        problem: Problem,
-        rows: Array,
-        par: Array,
-        value: Callable[[Problem], Outcome],
-        shape: tuple[int, ...],
-    ) -> tuple[dict[str, Any], str]:
-        """Return what `over` does, from the values of one, in threads."""
-
-        def of_one(y0: Array, values: Array) -> Outcome:
-            parameters: Any = problem.system.unpack(values)
-            return value(problem.replace(y0=y0, parameters=parameters))
-
-        with ThreadPoolExecutor(self.threads) as pool:
-
-            def of_several(rows: Array, par: Array) -> Outcomes:
-                return tuple(zip(*pool.map(of_one, rows, par), strict=True))  # type: ignore[return-value]
-
-            return self.over(rows, par, of_several, shape, self.threads, first=1)  # it compiles what all need
-
-    def over(
-        self,
-        rows: Array,
-        par: Array,
-        value: Callable[[Array, Array], Outcomes],
-        shape: tuple[int, ...],
-        piece: int,
-        first: int | None = None,
-    ) -> tuple[dict[str, Any], str]:
-        """Return the values of all, one in each row, and their ends; and why no file was written.
-
-        Parameters
-        ----------
-        rows, par : ndarray, shapes (n, dim), (n, n_par)
-            Initial conditions and parameters.
-        value : callable
-            What makes the values of several.
-        shape : tuple of int
-            Of the values of one.
-        piece, first : int
-            For how many at a time, and at first.
-        """
-        progress, n = self.progress, len(rows)
-        if not callable(progress) and not isinstance(progress, bool):
-            raise InputError(f"progress={shown(progress)} must be True, False or a function of the progress.")
-        state: dict[str, Any] = {
-            "values": np.full((n, *shape), np.nan),
-            "status": [Status.INTERRUPTED] * n,
-            "reason": ["Ctrl-C was pressed before it was at its end."] * n,
-            "made": 0,
-            "steps": 0,
-        }
-        path = None if self.checkpoint is None else Path(self.checkpoint)
-        earlier = None if self.resume is None else Path(self.resume)
-        if earlier is not None and (earlier != path or earlier.exists()):
-            state = read(earlier, self.belongs)
-        with Bar() if progress is True else nullcontext(progress or None) as report:
-            watch = Watch(0.0, float(n), report, path, self.every_seconds, self.belongs)
-            with suppress(KeyboardInterrupt):
-                while (made := state["made"]) < n:
-                    here = slice(made, made + (piece if made or first is None else first))
-                    values, status, reason, steps = value(rows[here], par[here])
-                    state["values"][here] = values
-                    state["status"][here] = status
-                    state["reason"][here] = reason
-                    state["made"] = made + len(status)
-                    state["steps"] += sum(steps)
-                    watch.keep(state)
-                    watch.look(float(state["made"]), state["steps"])
-            watch.write()
-        return state, watch.failure
-
-
-def _told(rows: Array, par: Array) -> Array:
-    """Return what a file says of the trajectories."""
-    return np.concatenate([rows.ravel(), par.ravel()])
 
 
 def _all_steps(problem: Problem, method: MethodBase, t_end: float | None) -> Array:
@@ -486,8 +367,9 @@ def _all_steps(problem: Problem, method: MethodBase, t_end: float | None) -> Arr
     return problem.t0 + h * np.arange(1, last + 1)
 
 
-def _megno(together: Together, t0: float, times: Array, rows: Array, par: Array) -> Outcomes:
+def _megno(many: Many, t_end: float | None, together: Together, rows: Array, par: Array) -> Outcomes:
     """Return MEGNO of several trajectories in lanes."""
+    t0, times = many.problem.t0, _all_steps(many.problem, many.method, t_end)
     followed, mean = together.follow(rows, par, times), MeanGrowth(len(rows))
     before, values = np.zeros((len(rows), 1)), np.full(len(rows), np.nan)
     for part, _, growth in followed:
@@ -499,9 +381,10 @@ def _megno(together: Together, t0: float, times: Array, rows: Array, par: Array)
 
 
 def _largest(
-    together: Together, problem: Problem, end: float, skip: float, n: int, rows: Array, par: Array
+    many: Many, end: float, skip: float, n: int, together: Together, rows: Array, par: Array
 ) -> Outcomes:
     """Return the largest exponents of several trajectories in lanes, as `_exponents` does of one."""
+    problem = many.problem
     times = together.steps_until(interval_ends(problem, end))
     followed, values = together.follow(rows, par, times), np.full((len(rows), 3 * n + 3), np.nan)
     if np.count_nonzero(times >= problem.t0 + skip) <= 2 * WAVES:

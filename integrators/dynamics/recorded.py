@@ -33,6 +33,35 @@ class _Sample:
     records: Any
 
 
+def start_of_recorded(program: Program, y0: Array, par: Array, t0: float, end: float) -> Any:
+    """Return a stepper whose steps have adjoints and are those on the way to ``end``.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If the method has no adjoint.
+    """
+    stepper: Any = program.start(y0, par, t0)
+    if not (offers(stepper, Gradients) and offers(stepper, Checkpoints)):
+        raise InputError("a method whose steps have no adjoint has no gradients; use Gauss or HBVM.")
+    if offers(stepper, Destination):
+        stepper.destination = end
+    return stepper
+
+
+def finished(samples: Samples) -> Samples:
+    """Return samples that are all there.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If the last time was not reached.
+    """
+    if samples.status is not Status.FINISHED:
+        raise InputError(f"there is no gradient of what is not reached: {samples.reason}")
+    return samples
+
+
 class Recorded:
     """A trajectory whose steps are kept, or can be made again, for adjoints.
 
@@ -80,24 +109,21 @@ class Recorded:
         memory: float = MEMORY,
     ):
         start, values = problem.y0 if y0 is None else y0, problem.par if par is None else par
-        stepper: Any = program.start(start, values, problem.t0)
-        if not (offers(stepper, Gradients) and offers(stepper, Checkpoints)):
-            raise InputError("a method whose steps have no adjoint has no gradients; use Gauss or HBVM.")
+        grid = check_times(times, problem.t0)
+        stepper = start_of_recorded(program, start, values, problem.t0, float(grid[-1]))
         self._stepper, self._parts = stepper, list[_Segment | _Sample]()
         self._memory, self._held, self._oldest = memory, 0.0, 0
         size = stepper.recorder(1).bytes
         self._longest = int(max(1, min(memory // (2 * size), SEGMENT)))
-        grid = check_times(times, problem.t0)
         self.y = np.empty((grid.size, problem.system.dim))
-        if offers(stepper, Destination):
-            stepper.destination = float(grid[-1])
+        self._here = stepper.checkpoint()
         for i, time in enumerate(grid.tolist()):
             self._go(time)
-            here, last = stepper.checkpoint(), stepper.recorder(1)
+            last = stepper.recorder(1)
             stepper.record(last)
-            self.y[i] = self._finished(stepper.advance(np.array([time]))).y[0]
+            self.y[i] = finished(stepper.advance(np.array([time]))).y[0]
             self._parts.append(_Sample(i, last))
-            stepper.restore(here)  # the steps go on as if there were no sample
+            stepper.restore(self._here)  # the steps go on as if there were no sample
         segments = [part for part in self._parts if isinstance(part, _Segment)]
         self.steps = sum(segment.steps for segment in segments) + len(self._parts[-1].records)
         self.solver = stepper.stats.solver
@@ -107,12 +133,12 @@ class Recorded:
         """Take the steps that end before a time, or at it."""
         capacity = min(FIRST, self._longest)
         while True:
-            start = self._stepper.checkpoint()
             records = self._record(capacity, time)
             if len(records):
-                self._parts.append(_Segment(start, time, len(records), records))
+                self._parts.append(_Segment(self._here, time, len(records), records))
                 self._held += records.bytes
                 self._forget()
+                self._here = self._stepper.checkpoint()
             if len(records) < capacity:
                 return
             capacity = min(2 * capacity, self._longest)
@@ -129,13 +155,8 @@ class Recorded:
     def _record(self, most: int, time: float) -> Any:
         records = self._stepper.recorder(most)
         self._stepper.record(records)
-        self._finished(self._stepper.march(time, most))
+        finished(self._stepper.march(time, most))
         return records
-
-    def _finished(self, samples: Samples) -> Samples:
-        if samples.status is not Status.FINISHED:
-            raise InputError(f"there is no gradient of what is not reached: {samples.reason}")
-        return samples
 
     def pulled_back(self, gradients: Array, *, parameters: bool) -> tuple[Array, Array]:
         """Return derivatives with respect to the start and the parameters of what has them at the samples.

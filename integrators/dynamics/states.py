@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from integrators.dynamics.recorded import Recorded
+from integrators.dynamics.recorded import Recorded, finished, start_of_recorded
 from integrators.protocol import Array, MethodBase, check_problem
 from integrators.refusals import check_times
 from integrators.running.integrate import prepared
@@ -52,7 +52,7 @@ class StatesAt:
             If a trajectory does not reach the last time, or the method has no adjoint.
         """
         rows, values, batch = self._rows(y0, par)
-        made = self._each(lambda i: self._recorded(rows[i], values[i]).y, len(rows))
+        made = self._each(lambda i: self._states(rows[i], values[i]), len(rows))
         return np.array(made).reshape(*batch, self.times.size, self.problem.system.dim)
 
     def pulled_back(self, y0: ArrayLike, par: ArrayLike, gradient: ArrayLike) -> tuple[Array, Array]:
@@ -88,6 +88,11 @@ class StatesAt:
             for part in (y0, par)
         )
         return rows, values, batch
+
+    def _states(self, y0: Array, par: Array) -> Array:
+        t0, times = self.problem.t0, self.times
+        stepper = start_of_recorded(self._program, y0.copy(), par.copy(), t0, float(times[-1]))
+        return finished(stepper.advance(times)).y
 
     def _recorded(self, y0: Array, par: Array) -> Recorded:
         return Recorded(self._program, self.problem, self.times, y0=y0.copy(), par=par.copy())
