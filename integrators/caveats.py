@@ -48,7 +48,7 @@ def warnings(
     caveat: str | None,
     extra: Mapping[str, Any],
 ) -> tuple[str, ...]:
-    """Return the sentences on discontinuities, too small a start, and units that do not suit it.
+    """Return the sentences on discontinuities, lost invariants, too small a start, and units.
 
     Parameters
     ----------
@@ -80,6 +80,11 @@ def warnings(
             "numbers that the field is calculated from are beyond the range of doubles, though the state "
             "is not: errors may have any size; take other units.",
         )
+    said += tuple(
+        f"{name} has lost {change / size:.1e} of the size of its terms, first in the step to t = {first!r}, as "
+        "its line integrals are computed with too few nodes; raise k or shorten the steps."
+        for name, (first, change, size) in extra.get("lost", {}).items()
+    )
     if not discontinuities:
         return said
     t, h = discontinuities[0]

@@ -64,9 +64,10 @@ class LineIntegral(MethodBase):
 
     Rounding is taken back: before each step the invariants are evaluated at the
     present state, and what they have lost since the start enters the equations for
-    alpha, provided that it is no more than rounding accounts for. So their errors
-    do not grow with the number of steps. What the quadrature loses (k too small) is
-    not hidden by this: it stays lost, and ``stats.extra["lost"]`` counts it.
+    alpha, provided that it is no more than rounding accounts for: 2^-46 of the largest
+    terms so far. So their errors do not grow with the number of steps. What the quadrature
+    loses (k too small) is not hidden by this: it stays lost, and `Solution.warnings` says how much
+    that is.
 
     Limits: keeping invariants is not accuracy. Invariants that are not named are
     kept only as far as the order does; momentum, say, which plain HBVM keeps. An

@@ -36,6 +36,8 @@ class LineContext(Context):
     alpha = Array("invariants")
     reference = Array("invariants")  # what the invariants are to be
     owed = Array("invariants")  # what the step ahead is to take back of what rounding took from them
-    losses = Integer()  # times that an invariant had moved by more than rounding accounts for
+    largest = Array("invariants")  # terms so far, of which rounding is a part
+    lost = Array("invariants")  # what was more than rounding, added up,
+    first_loss = Array("invariants")  # and the time when it was seen first
     culprit = Integer()  # the invariant that is none,
     change_rate = Real()  # and its rate of change beside the terms of that

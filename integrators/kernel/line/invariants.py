@@ -26,7 +26,7 @@ from integrators.kernel.step.stages import group_offset, offset
 
 DEPENDENT = 1e-10  # a pivot this small, relative to its row, is none
 REGULAR = 1e-6  # rounding is taken back along these directions only
-ROUNDING = 2.0**-46  # a larger gap in an invariant, relative to its terms, is not rounding
+ROUNDING = 2.0**-46  # a larger gap in an invariant, relative to the largest terms so far, is not rounding
 GAIN = 0.125  # of a gap is taken back in a step: the noise of its evaluation averages out
 
 
@@ -152,16 +152,12 @@ def measure_gap(ctx):
     """Set ``owed`` to what the step is to take back: a part of what rounding cost the invariants so far.
 
     What is more than rounding was lost by the quadrature (k too small); it is
-    counted and stays lost: the invariants are then kept at what they are now. At a start without a
-    past they are what they are. Uses the first stages, which the previous step does not need any more.
+    added up and stays lost: the invariants are then kept at what they are now. At a start without a
+    past they are what they are. Rounding is a part of the largest terms so far: at a turning point
+    those of the moment nearly vanish. Uses the first stages, which the previous step does not need any more.
     """
-    remainders, reference, owed, active, terms = (
-        ctx.remainders,
-        ctx.reference,
-        ctx.owed,
-        ctx.active,
-        ctx.terms,
-    )
+    remainders, reference, owed, terms = ctx.remainders, ctx.reference, ctx.owed, ctx.terms
+    active, largest, lost = ctx.active, ctx.largest, ctx.lost
     state, error, lanes, dim, n = ctx.state, ctx.error, ctx.lanes, ctx.rows, ctx.invariants
     for lane in range(lanes):
         ctx.times[lane] = ctx.t0
@@ -177,13 +173,16 @@ def measure_gap(ctx):
             scale += abs(slope) * (abs(state[d]) + abs(ctx.length) * steepest(ctx, d))
             terms[d] = slope * error[d]
         gap += ordered(ctx)
+        largest[a] = max(largest[a], scale)
         if ctx.length == 0.0:
             reference[a], gap = value, 0.0
         elif not active[a]:
             gap = 0.0
-        elif not abs(gap) <= ROUNDING * scale:
+        elif not abs(gap) <= ROUNDING * largest[a]:
+            if lost[a] == 0.0:
+                ctx.first_loss[a] = ctx.t0
+            lost[a] += abs(gap)
             reference[a], gap = value, 0.0
-            ctx.losses += 1
         owed[a] = GAIN * gap
 
 

@@ -21,6 +21,12 @@ from problems.problem import System
 from problems.systems.poisson import Poisson
 
 
+KEPT = (
+    "reference", "owed", "active", "gradients", "alpha", "legendre", "largest", "lost", "first_loss"
+)  # fmt: skip
+"""Arrays of a `LineContext` that the steps ahead depend on."""
+
+
 class Kept:
     """Several invariants of a system, or the energy of a Poisson system.
 
@@ -90,14 +96,17 @@ class Kept:
     @property
     def arrays(self) -> tuple[str, ...]:
         """What a checkpoint holds of it, by the names in `LineContext`."""
-        return ("reference", "owed", "active", "gradients", "alpha", "legendre") if self.names else ()
+        return KEPT if self.names else ()
 
     def report(self, context: Any) -> dict[str, Any]:
         """Return what `stats.extra` says of a trajectory."""
         if not self.names:
             return {}
-        left_out = [name for name, on in zip(self.names, context.active, strict=True) if not on]
-        return {"lost": context.losses, "left_out": left_out}
+        seen = zip(context.first_loss.tolist(), context.lost.tolist(), context.largest.tolist(), strict=True)
+        return {
+            "lost": {name: loss for name, loss in zip(self.names, seen, strict=True) if loss[1] > 0.0},
+            "left_out": [name for name, on in zip(self.names, context.active, strict=True) if not on],
+        }
 
     def refusal(self, contexts: tuple[Any, Any], t: float) -> str:
         """Return why the step from t has ended as `NOT_KEPT`: the step of a pair of contexts, or a part."""
@@ -110,8 +119,9 @@ class Kept:
     def load(self, contexts: tuple[Any, Any], y: Array, par: Array, t0: float) -> None:
         """Put into a pair of contexts what follows from the start (t0, y) and from the parameters."""
         own, partial = contexts
-        own.losses = own.change_rate = partial.change_rate = 0
+        own.change_rate = partial.change_rate = 0.0
         if self.names:
+            own.largest[:] = own.lost[:] = own.first_loss[:] = 0.0
             own.metric[:] = metric_of(self.system, par)
             own.active[:] = independent(self.system, self.values, own.metric, y, par, t0)
 
