@@ -81,8 +81,9 @@ def warnings(
             "is not: errors may have any size; take other units.",
         )
     said += tuple(
-        f"{name} has lost {change / size:.1e} of the size of its terms, first in the step to t = {first!r}, as "
-        "its line integrals are computed with too few nodes; raise k or shorten the steps."
+        f"{name} has lost {change / size:.1e} of the size of its terms, first in the step at t = {first!r}: "
+        "its line integral needs more nodes, or it is no invariant where the stages are; raise k, or shorten "
+        "the steps."
         for name, (first, change, size) in extra.get("lost", {}).items()
     )
     if not discontinuities:

@@ -350,7 +350,8 @@ class HBVMStepper(ABC):
         ``rescues`` (full Newton iterations of steps that a fixed Jacobian could not solve). With several
         invariants also ``"lost"``, a dict of those that moved by more than rounding accounts for (k is then
         too small): the time when that was seen first, by how much in all, and the size of the terms; and
-        ``"left_out"``, the names of those that follow from others. With adaptive step size also the method's ``"k"`` and ``"s"`` and, where the field
+        ``"left_out"``, the names of those that follow from others.
+        With adaptive step size also the method's ``"k"`` and ``"s"`` and, where the field
         or a derivative of it is discontinuous, ``"kinks"``: pairs (t, h), the place that a step had to be cut
         for and the length at which it was found, or the time and 0 where a step ends on a switching surface,
         of the first 64 places. With variations ``"variations"``, a dict: their iterations.

@@ -74,6 +74,8 @@ class System:
         Description of an N-body system.
     invariants : mapping of str to Function
         The conserved quantities by name, the energy first; a list of numbers is one function.
+    on_manifold : frozenset of str
+        Invariants that are conserved on a manifold only, such as where constraints hold.
     guards : mapping of str to Function
         Quantities that are exactly 0 by a symmetry.
 
@@ -89,6 +91,7 @@ class System:
 
     kind: ClassVar[str]
     traced: ClassVar[bool] = True
+    on_manifold: ClassVar[frozenset[str]] = frozenset()
 
     def __init__(
         self,

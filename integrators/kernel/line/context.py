@@ -26,6 +26,7 @@ class LineContext(Context):
     back = Array()  # coefficients -> values at the stages
     metric = Array("rows")  # the diagonal of W
     active = Array("invariants", kind=int)  # 0 for an invariant that follows from others
+    on_manifold = Array("invariants", kind=int)  # 1 for an invariant of the solutions on a manifold only
     order = Array(kind=int)  # in which components are summed up
     ends = Array(kind=int)  # 1 where a partial sum of that order ends
     terms = Array("rows")  # of such a sum

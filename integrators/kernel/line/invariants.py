@@ -12,7 +12,9 @@ out of their first s Legendre coefficients,
 
     r_i = -sum_l b_l (g_i - sum_j P_j phi_ij)' (f - sum_j P_j gamma_j)  at c_l,
 
-of size h^{2s} without cancellation; it is this sum that is computed.
+of size h^{2s} without cancellation; it is this sum that is computed. An invariant of the solutions on a
+manifold, such as the energy of a system with constraints, has g_i'f = 0 there only, which stages
+leave by the stage order: for such invariants it is the former sum.
 
 The order of every sum is that of the array ``order``: the same coordinate of all
 bodies first. Where bodies mirror each other, the sums that vanish by symmetry
@@ -100,9 +102,16 @@ def set_right(ctx):
         sums, remainders = ctx.gradients + row(ctx, chunk), ctx.remainders + row(ctx, chunk)
         for d in range(width):
             put(remainders, lanes * d, get(sums, lanes * d) - get(remainders, lanes * d))
+    legendre, every, groups = ctx.legendre, ctx.every, ctx.coefficient_groups
     for a in range(ctx.invariants):
         for d in range(dim):
             products = splat8(0.0)
+            if ctx.on_manifold[a]:
+                for group in range(groups):
+                    i = 8 * every * group
+                    products += get(legendre, i + 8 * d) * get(legendre, i + 8 * (dim * (1 + a) + d))
+                terms[d] = total(products)
+                continue
             for chunk in range(ctx.chunks):
                 remainders = ctx.remainders + row(ctx, chunk)
                 product = get(remainders, lanes * d) * get(remainders, lanes * (dim * (1 + a) + d))
@@ -216,7 +225,8 @@ def find_change(ctx, threshold):
             terms[d] = total(products)
             size += total(sizes)
         slope = abs(ordered(ctx))
-        if not slope <= threshold * size:  # a gradient that is not finite is no good either
+        # a gradient that is not finite is no good either
+        if not slope <= (2.0 if ctx.on_manifold[a] else threshold) * size:
             ctx.culprit, ctx.change_rate = a, slope / size
             return True
     return False

@@ -20,7 +20,6 @@ from problems.graph.nodes import T
 from problems.problem import System
 from problems.systems.poisson import Poisson
 
-
 KEPT = (
     "reference", "owed", "active", "gradients", "alpha", "legendre", "largest", "lost", "first_loss"
 )  # fmt: skip
@@ -54,6 +53,7 @@ class Kept:
         self.system = system
         scalars = {part: scalar for name in invariants for part, scalar in components(system, name).items()}
         self.names = list(scalars)
+        self._on_manifold = [name.partition("[")[0] in system.on_manifold for name in self.names]
         n, dim = len(self.names), system.dim
         self.code = [line.code()]
         if n:
@@ -90,7 +90,7 @@ class Kept:
 
     def share(self, own: Context, partial: Context) -> None:
         """Let partial steps keep what the steps do."""
-        for name in ("active", "owed", "metric") if self.names else ():
+        for name in ("active", "owed", "metric", "on_manifold") if self.names else ():
             partial.point({name: getattr(own, name)})
 
     @property
@@ -122,6 +122,7 @@ class Kept:
         own.change_rate = partial.change_rate = 0.0
         if self.names:
             own.largest[:] = own.lost[:] = own.first_loss[:] = 0.0
+            own.on_manifold[:] = self._on_manifold
             own.metric[:] = metric_of(self.system, par)
             own.active[:] = independent(self.system, self.values, own.metric, y, par, t0)
 
