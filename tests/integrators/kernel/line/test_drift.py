@@ -24,12 +24,7 @@ SYSTEM = problems.VectorField(
         "speed": lambda y: y[0] * y[2] + y[1] * y[3],
     },
 )
-ANGLES = (0.0, -1.5, 1.2, 2.0)  # from the horizontal; judged by the moment 0 loses 4e-14 in 1e5 steps of .1
-    0.0,
-    -1.5,
-    1.2,
-    2.0,
-)  # from the horizontal; 0 loses 4e-14 in 1e5 steps of 0.1 if judged by the moment
+ANGLES = (0.0, -1.5, 1.2, 2.0)  # from the horizontal
 
 
 def largest_changes(h, steps, angle, k=24, s=8):
