@@ -1,1 +1,0 @@
-"""Random Hamiltonians: how often an integrator reports success and is wrong."""
