@@ -6,6 +6,7 @@ STAMP  := $(VENV)/.installed
 PIP     = $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
 REPORTS ?= sitnikov
+STUDIES ?=
 
 .PHONY: bench examples pages reports test test-all test-aarch64 docs lint format venv lock clean
 
@@ -17,6 +18,7 @@ examples: venv  ## the fourteen tasks beside other libraries: writes examples/me
 
 reports: venv  ## write the committed reports of campaigns, REPORTS="sitnikov drift ...", from runs/; what is missing there runs
 	for name in $(REPORTS); do $(BIN)/hbvm-bench run $$name --report reports/$$name || exit 1; done
+	for name in $(STUDIES); do $(BIN)/hbvm-bench run reports/$$name --report reports/$$name || exit 1; done
 
 pages: venv  ## draw reports/*/index.html from the archives that lie there; nothing is run
 	$(BIN)/hbvm-bench report --pages reports

@@ -29,9 +29,12 @@ from hbvm_bench.campaign.sweep import PLACEHOLDER, Scalar, combinations, fill, n
 from problems import limits
 from problems.errors import InputError, unknown
 
+STUDY = "study.toml"
+"""The campaign's file in the folder of a study."""
+
 
 class Campaign(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
-    """What a campaign file says; see the files in ``hbvm_bench/campaign/shipped``.
+    """What a campaign file says; see the files in ``hbvm_bench/studies``.
 
     Attributes
     ----------
@@ -50,8 +53,8 @@ class Campaign(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     page : Page
         Which blocks its page has.
     computes : str
-        What a study computes beside the cases, such as ``"paper.report:compute"``: a function in
-        ``COMPUTATIONS`` of a module of `hbvm_bench.studies`.
+        What is computed beside the cases, such as ``"./blocks.py:tasks"``: a function that returns
+        `hbvm_bench.measure.computation.Task`; see `hbvm_bench.campaign.folder`.
     quick : bool
         Whether only those settings are run that are marked for a quick run.
     """
@@ -212,12 +215,14 @@ class Case(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 def shipped() -> dict[str, Path]:
     """Return the campaign files that come with the package, by name."""
-    folder = Path(str(files("hbvm_bench.campaign") / "shipped"))
-    return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+    folder = Path(str(files("hbvm_bench.studies")))
+    alone = {path.stem: path for path in folder.glob("*.toml")}
+    folders = {path.parent.name: path for path in folder.glob(f"*/{STUDY}")}
+    return dict(sorted((alone | folders).items()))
 
 
 def file_of(name_or_path: str) -> Path:
-    """Return where a campaign's file lies: that of a shipped one, or of a path that ends in ``.toml``.
+    """Return where a campaign's file lies: a shipped one, a path ending in ``.toml``, or a folder.
 
     Raises
     ------
@@ -225,11 +230,15 @@ def file_of(name_or_path: str) -> Path:
         If there is none.
     """
     path = Path(name_or_path)
+    if (path / STUDY).is_file():
+        return path / STUDY
     if path.suffix == ".toml":
         if not path.is_file():
             raise InputError(f"there is no campaign file {name_or_path!r}.")
         return path
     if name_or_path not in shipped():
+        if path.is_dir():
+            raise InputError(f"the folder {name_or_path!r} has no {STUDY}.")
         raise unknown("campaign", name_or_path, shipped())
     return shipped()[name_or_path]
 

@@ -34,7 +34,7 @@ SEPARATE = {
     for module, commands in {
         "about": ("advise", "engines", "inspect"),
         "doctor": ("doctor", "warm"),
-        "paper": ("chaos", "paper"),
+        "paper": ("paper",),
         "reports": ("gallery", "report"),
         "run": ("run",),
         "stores": ("compare", "export", "merge"),

@@ -11,6 +11,7 @@ from rich.text import Text
 
 from hbvm_bench.campaign.identity import Resolved
 from hbvm_bench.report.terminal import console
+from hbvm_bench.run.task import Planned
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries.rows import seconds, status_of
 
@@ -26,7 +27,7 @@ class Live:
         self._start = time.monotonic()
         self._title = ""
         self._total = self._count = 0
-        self._since: dict[str, tuple[Resolved, float]] = {}
+        self._since: dict[str, tuple[Resolved | Planned, float]] = {}
         self._round = -1
         self._told = self._start
         self._live = RichLive(
@@ -48,7 +49,7 @@ class Live:
         kept = f", {done} already there" if done else " to do"
         self._console.print(f"{title}: {self._total}{kept}")
 
-    def running(self, cases: Sequence[Resolved]) -> None:
+    def running(self, cases: Sequence[Resolved | Planned]) -> None:
         """Say which cases run now."""
         now = time.monotonic()
         self._since = {case.id: self._since.get(case.id, (case, now)) for case in cases}

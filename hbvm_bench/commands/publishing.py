@@ -13,8 +13,12 @@ from hbvm_bench.report.write import write
 from hbvm_bench.store.store import PACKED, Store
 
 
-def report_on(stores: Sequence[Store], directory: Path, *, stderr: bool = True) -> Results:
+def report_on(
+    stores: Sequence[Store], directory: Path, study: Path | None = None, *, stderr: bool = True
+) -> Results:
     """Write the page of runs with the rows that it is made of, and return these.
+
+    ``study`` is the folder with the blocks that a campaign has of its own; see `gather`.
 
     Where its campaign has results of several kinds of processor side by side, those that lie there stay.
 
@@ -25,7 +29,7 @@ def report_on(stores: Sequence[Store], directory: Path, *, stderr: bool = True) 
     """
     if len(stores) == 1 and stores[0].index().campaign.page.by_processor:
         stores = joined(stores[0], directory / PACKED)
-    results = gather(stores)
+    results = gather(stores, study)
     document = page_of(results)
     publish(document, directory, contents(document, results.runs, stores), stderr=stderr)
     return results

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from hbvm_bench.campaign.file import STUDY
 from hbvm_bench.store.files import ensure_writable
 from hbvm_bench.store.store import opened
 from problems.errors import InputError
@@ -19,6 +20,10 @@ def report(
     out: Annotated[
         Path | None,
         typer.Option("-o", "--out", help="Directory of the report; default: RUN/report of the first run."),
+    ] = None,
+    study: Annotated[
+        Path | None,
+        typer.Option("--study", help="Folder of the study whose page it is, where it has blocks of its own."),
     ] = None,
     show: Annotated[bool, typer.Option("--open", help="Open the page in the browser.")] = False,
     index: Annotated[
@@ -43,7 +48,7 @@ def report(
             store.index()
         target = out or runs[0] / "report"
         ensure_writable(target, keep=False)
-        report_on(stores, target, stderr=False)
+        report_on(stores, target, study or _beside(runs[0]), stderr=False)
         if show:
             webbrowser.open((target / "index.html").resolve().as_uri())
     if pages is not None:
@@ -55,6 +60,11 @@ def report(
         from hbvm_bench.report.index import write_index
 
         print(write_index(index))
+
+
+def _beside(run: Path) -> Path | None:
+    """Return the folder of a report that is the folder of its study too; ``None`` for any other."""
+    return run if (run / STUDY).is_file() else None
 
 
 def gallery(

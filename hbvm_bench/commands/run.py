@@ -13,15 +13,15 @@ from msgspec.structs import replace
 
 from hbvm_bench.campaign import own
 from hbvm_bench.campaign.file import Campaign, Goal, Grid, MethodEntry, ProblemEntry, file_of, load
-from hbvm_bench.campaign.identity import Resolved, make_method, of_study
+from hbvm_bench.campaign.identity import Resolved, make_method
 from hbvm_bench.campaign.shorter import quick_run
 from hbvm_bench.campaign.spec import file_of as python_file_of
 from hbvm_bench.commands.live import Live
-from hbvm_bench.measure import machine, reading
+from hbvm_bench.measure import reading
 from hbvm_bench.report import terminal
-from hbvm_bench.run import checked, executors, loop, references, supervise, timing_pass
+from hbvm_bench.run import checked, computing, executors, loop, references, supervise, timing_pass
 from hbvm_bench.run.executors import Pool
-from hbvm_bench.run.task import InterruptedRunError, UnfinishedRunError
+from hbvm_bench.run.task import InterruptedRunError, Planned, UnfinishedRunError
 from hbvm_bench.store.files import ensure_writable
 from hbvm_bench.store.store import Index, Store
 from problems.errors import InputError
@@ -34,7 +34,9 @@ PRINTED = 1000  # cases; the tables of more are for `hbvm-bench show`
 
 def run(
     context: typer.Context,
-    name: Annotated[str | None, typer.Argument(help="A campaign's name, or a TOML file.")] = None,
+    name: Annotated[
+        str | None, typer.Argument(help="A campaign, a TOML file, or a folder with study.toml.")
+    ] = None,
     problem: Annotated[
         list[str] | None,
         typer.Option("-p", "--problem", help='A problem, as in "sitnikov(e=0.6)" or "mine.py:swing(g=1.1)".'),
@@ -80,21 +82,29 @@ def run(
     campaign = _campaign(name, problem, method, step, reference)
     campaign = quick_run(campaign) if quick else campaign
     campaign = opened(campaign, name)
+    study = None if name is None else file_of(name).parent
     if report_to is not None:
         from hbvm_bench.report.page import find  # what draws costs seconds to import
 
         ensure_writable(report_to, keep=False)
         for block in campaign.page.blocks:
-            find(block)
+            find(block, study)
     out = out or Path("runs") / (campaign.name + "-quick" * quick)
     store = carry_out(
-        campaign, out, as_typed(context), executor=executor, jobs=jobs, timing=timing, whole=True
+        campaign,
+        out,
+        as_typed(context),
+        study=study,
+        executor=executor,
+        jobs=jobs,
+        timing=timing,
+        whole=True,
     )
     show(campaign, store)
     if report_to is not None:
         from hbvm_bench.commands.publishing import report_on
 
-        report_on([store], report_to, stderr=False)
+        report_on([store], report_to, study, stderr=False)
     refuse_died(store)
 
 
@@ -165,12 +175,15 @@ def carry_out(
     directory: Path,
     command: str,
     *,
+    study: Path | None = None,
     executor: str = executors.LOCAL,
     jobs: int | None = None,
     timing: bool = True,
     whole: bool = False,
 ) -> Store:
     """Run what is missing of a campaign in a directory, and return its store; ``command`` runs it again.
+
+    ``study`` is the folder of the campaign's file, in which its computations are.
 
     All that a campaign says is checked where it is ``whole``: what is left out of one, such as a method, may
     still be named in a goal.
@@ -187,6 +200,7 @@ def carry_out(
     cases = loop.plan(campaign)
     if whole:
         checked.check(campaign, cases)
+    computations = computing.plan(campaign, study)
     with executors.opened(executor, jobs) as pool:  # what is refused is refused before anything is written
         store.prepare()
         if references.make_missing(campaign, store, _say):  # to which the grid and the ids belong
@@ -197,10 +211,7 @@ def carry_out(
             index = Index(campaign=asked, ids=ids, version=version("hbvm-bench"), command=command)
             store.write_index(index)
             try:
-                _run(campaign, cases, store, pool, timing)
-                if campaign.computes:
-                    compute = of_study(campaign.computes, "COMPUTATIONS")
-                    compute(store, jobs or len(machine.cores()), _say)
+                _run(campaign, cases, computations, store, pool, timing)
             except (KeyboardInterrupt, InterruptedRunError):
                 raise _given_up("interrupted", ids, store, INTERRUPTED) from None
             except UnfinishedRunError as error:
@@ -265,7 +276,14 @@ def _campaign(
     )
 
 
-def _run(campaign: Campaign, cases: list[Resolved], store: Store, pool: Pool, timing: bool) -> None:
+def _run(
+    campaign: Campaign,
+    cases: list[Resolved],
+    computations: list[Planned],
+    store: Store,
+    pool: Pool,
+    timing: bool,
+) -> None:
     supervise.allow()
     missing = [case for case in cases if not loop.is_kept(case, store, campaign.limits)]
     with Live() as live:
@@ -273,6 +291,10 @@ def _run(campaign: Campaign, cases: list[Resolved], store: Store, pool: Pool, ti
             live.phase(f"measuring {pool.where}", len(missing), len(cases) - len(missing))
             for record in loop.run_accuracy(missing, store, campaign.limits, pool, live.running):
                 live.case(record)
+            if left := computing.missing(computations, store):
+                live.phase("computing", len(left), len(computations) - len(left))
+                for record in computing.run(left, store, campaign, pool, live.running):
+                    live.case(record)
             if timing:
                 _time(campaign, cases, store, live)
         except BaseException:

@@ -1,14 +1,17 @@
 """Readings: errors, their growth and metrics, computed from the stored series by pure functions.
 
 A reading is kept in the user's cache under a digest of all that it depends on: the record, its reference, and
-the sources that make it; a change makes it anew and runs no integration.
+what is installed; a change makes it anew and runs no integration.
 """
 
 from functools import cache
+from pathlib import Path
 
 import msgspec
 
-from hbvm_bench.campaign.identity import digest_of, make_problem
+import problems
+from hbvm_bench.campaign import folder
+from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.measure import measured, metrics
 from hbvm_bench.measure.measured import Measured, Series
 from hbvm_bench.reference import solutions
@@ -100,4 +103,4 @@ def with_reading(record: Record, reading: Reading) -> Record:
 @cache
 def rule() -> str:
     """Return the digest of the sources that make readings of series."""
-    return digest_of((metrics.__name__,))
+    return folder.digest(Path(__file__).parent) + folder.digest(Path(problems.__file__).parent)

@@ -44,7 +44,7 @@ def write_pages(directory: Path) -> Iterator[Path]:
     for folder in sorted(path for path in directory.iterdir() if path.is_dir()):
         if (folder / PACKED).is_file():
             path = folder / "index.html"
-            files = pages(document(Store(folder / PACKED).runs()), folder)
+            files = pages(document(Store(folder / PACKED).runs(), folder), folder)
             write_all({folder / name: text.encode() for name, text in files.items()})
             yield path
 

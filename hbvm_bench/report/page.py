@@ -1,7 +1,7 @@
 """The one builder of pages: a campaign names the blocks of its page, and a block is a function of results.
 
-A name without a colon is that of a block in `hbvm_bench.report.campaign`; ``race.report:ratios`` is the
-function ``ratios`` of ``hbvm_bench/studies/race/report.py``. A new block is a function with `block` above it.
+A name is that of a block in `hbvm_bench.report.campaign`; ``./blocks.py:table`` is the function ``table`` of
+a Python file beside the campaign's.
 """
 
 import re
@@ -9,12 +9,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from importlib import import_module
+from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hbvm_bench.campaign.file import Case, Page
+from hbvm_bench.campaign import folder
+from hbvm_bench.campaign.file import Case, Page, shipped
 from hbvm_bench.measure import machine, reading
 from hbvm_bench.report.document import Block, Document, attempt
 from hbvm_bench.report.figures.canvas import Picture
@@ -60,6 +62,10 @@ class Results:
         What is drawn of each case, by its id; empty where a report has figures instead.
     figures : sequence of (str, str)
         Of a report; see `Store.figures`.
+    computed : dict of (Record, dict)
+        The computations of a study with what they returned, by their keys.
+    study : Path or None
+        The folder of the campaign's file, where its own blocks are.
     beside : dict
         What a study keeps beside its cases, by name.
     """
@@ -68,6 +74,8 @@ class Results:
     records: list[Record]
     series: dict[str, Series]
     figures: Sequence[tuple[str, str]] = ()
+    computed: dict[str, tuple[Record, Series]] = field(default_factory=dict)
+    study: Path | None = None
     beside: dict[str, object] = field(default_factory=dict)
 
     @property
@@ -111,14 +119,16 @@ def block(function: F) -> F:
     return function
 
 
-def find(name: str) -> BlockMaker:
-    """Return the block called ``name``.
+def find(name: str, study: Path | None = None) -> BlockMaker:
+    """Return the block called ``name``; those of a campaign's own are in the folder ``study``.
 
     Raises
     ------
     problems.errors.InputError
         If there is none, with the nearest names.
     """
+    if folder.is_beside(name):
+        return folder.named(name, study)
     module, _, function = name.rpartition(":")
     place = f"{STUDIES}.{module}" if module else HERE
     if re.fullmatch(r"[\w.]+", place):
@@ -135,11 +145,12 @@ def _names() -> list[str]:
     return [name.removeprefix(f"{HERE}:").removeprefix(f"{STUDIES}.") for name in _blocks]
 
 
-def gather(stores: Stores) -> Results:
+def gather(stores: Stores, study: Path | None = None) -> Results:
     """Read the stores of one or more runs.
 
     A case that several runs have is taken from the run that is more complete
-    (`hbvm_bench.store.store.progress`).
+    (`hbvm_bench.store.store.progress`). ``study`` is the folder with the blocks of the campaign's own; that
+    of a shipped one is known.
 
     Raises
     ------
@@ -169,18 +180,24 @@ def gather(stores: Stores) -> Results:
         series[key] = reading.drawn(record, store.series(key)) if number < DRAWN_CASES else {}
         records.append(record)
     beside = {name: value for store in stores for name, value in store.studies().items()}
-    return Results(runs, records, series, stores[0].figures(), beside)
+    computed = {
+        key: (record, store.series(record.id)) for store in stores for key, record in store.computed().items()
+    }
+    name = indices[0].campaign.name
+    if study is None and name in shipped():
+        study = shipped()[name].parent
+    return Results(runs, records, series, stores[0].figures(), computed, study, beside)
 
 
-def document(stores: Store | Stores) -> Document:
+def document(stores: Store | Stores, study: Path | None = None) -> Document:
     """Return the page on one or more runs; raises what `gather` and `find` do."""
-    return page_of(gather([stores] if isinstance(stores, Store) else stores))
+    return page_of(gather([stores] if isinstance(stores, Store) else stores, study))
 
 
 def page_of(results: Results) -> Document:
     """Return the page on results; raises what `find` does."""
     page, campaigns = results.page, [run.index.campaign for run in results.runs]
-    makers = [(name, partial(find(name), results)) for name in page.blocks or DEFAULT]
+    makers = [(name, partial(find(name, results.study), results)) for name in page.blocks or DEFAULT]
     single = len({campaign.name for campaign in campaigns}) == 1
     titles = [campaign.title or campaign.name for campaign in campaigns]
     together = f"{len(titles)} runs together: {'; '.join(titles)}"

@@ -31,6 +31,8 @@ def contents(document: Document, runs: Sequence[StoredRun], stores: Sequence[Sto
         for record in run.records:
             arrays = reading.drawn(record, store.series(record.id)) if named else {}
             kept.save(record, {name: arrays[name] for name in named if name in arrays}, compress=False)
+        for record in store.computed().values():
+            kept.save(record, store.series(record.id), compress=False)
     for store in stores:
         for name, content in store.studies().items():
             kept.keep_study(name, content)

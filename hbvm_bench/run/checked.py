@@ -21,7 +21,7 @@ from hbvm_bench.campaign.file import (
     name_of,
 )
 from hbvm_bench.campaign.grid import Grid
-from hbvm_bench.campaign.identity import Resolved, is_ours, make_problem, of_study
+from hbvm_bench.campaign.identity import Resolved, is_ours, make_problem
 from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.campaign.sweep import fill
 from hbvm_bench.measure.measured import PLAIN, PREFIXES
@@ -54,8 +54,6 @@ def check(campaign: Campaign, cases: Sequence[Resolved]) -> None:
     for many in campaign.ensembles:
         _ensemble(many)
     _series(campaign.page, cases)
-    if campaign.computes:
-        of_study(campaign.computes, "COMPUTATIONS")
     here = _by_name(campaign, cases)
     for name, those in here.items():
         if not those:

@@ -4,14 +4,17 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
+from typing import TypeVar
 
 from hbvm_bench.campaign.file import Campaign, Limits
 from hbvm_bench.campaign.identity import Resolved, resolve
 from hbvm_bench.run.executors import Pool
-from hbvm_bench.run.task import InterruptedRunError, UnfinishedRunError, execute, task_of
+from hbvm_bench.run.task import InterruptedRunError, Planned, UnfinishedRunError, execute, task_of
 from hbvm_bench.store.records import COMPILING, DIED, Record, decoded
 from hbvm_bench.store.store import Store
 from problems.errors import InputError
+
+Job = TypeVar("Job", bound=Resolved | Planned)
 
 ATTEMPTS = 3  # of a case whose process dies, or that an executor loses with the machine that had it
 PATIENCE = 1.0  # seconds between two looks at how many slots there are
@@ -53,11 +56,11 @@ def is_kept(resolved: Resolved, store: Store, limits: Limits) -> bool:
 
 
 def run_accuracy(
-    cases: Sequence[Resolved],
+    cases: Sequence[Job],
     store: Store,
     limits: Limits,
     pool: Pool,
-    tell: Callable[[Sequence[Resolved]], None] = lambda running: None,
+    tell: Callable[[Sequence[Job]], None] = lambda running: None,
 ) -> Iterator[Record]:
     """Run cases side by side, store each as it finishes, and yield its record.
 
@@ -76,7 +79,7 @@ def run_accuracy(
         refuse one case after the other); and after all others, if it could not run some cases.
     """
     waiting = deque(cases)
-    running: dict[Future[tuple[bytes, bytes]], Resolved] = {}
+    running: dict[Future[tuple[bytes, bytes]], Job] = {}
     attempts: Counter[str] = Counter()
     failures: list[str] = []
     try:

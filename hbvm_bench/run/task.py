@@ -7,20 +7,23 @@ import sys
 import tempfile
 import threading
 from collections.abc import Mapping
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TypeVar
 
 import msgspec
+from msgspec.structs import replace
 
 from hbvm_bench.campaign import own
-from hbvm_bench.campaign.file import Limits
+from hbvm_bench.campaign.file import Case, Limits
 from hbvm_bench.campaign.identity import (
     Resolved,
     is_ours,
     kernel_digest,
     of_method,
     resolve,
+    version_of,
     versions_of,
 )
 from hbvm_bench.campaign.spec import parse_spec
@@ -28,7 +31,7 @@ from hbvm_bench.measure import machine
 from hbvm_bench.reference import solutions
 from hbvm_bench.run import ending, supervise, warm
 from hbvm_bench.run.supervise import Ended
-from hbvm_bench.run.worker import COMPILED, ENVIRONMENT, NO_ROOM, REPLY, STALE, Request
+from hbvm_bench.run.worker import COMPILED, ENVIRONMENT, NO_ROOM, REPLY, STALE, Computation, Request
 from hbvm_bench.store import arrays, records
 from hbvm_bench.store.records import COMPILING, DIED, Outcome, Record, Result
 from problems.errors import InputError
@@ -48,8 +51,21 @@ class UnfinishedRunError(Exception):
     """Some cases could not be run at all; what finished is in the store."""
 
 
-def task_of(resolved: Resolved, limits: Limits) -> bytes:
+@dataclass(frozen=True)
+class Planned:
+    """A computation of a study that is to run, as `Resolved` is a case."""
+
+    case: Case  # whose method is the key
+    id: str
+    computation: Computation
+
+
+def task_of(resolved: Resolved | Planned, limits: Limits) -> bytes:
     """Return the JSON of the `Request` for an accuracy run, which `execute` takes."""
+    if isinstance(resolved, Planned):
+        cases = {resolved.id: resolved.case}
+        limits = replace(limits, wall_seconds=resolved.computation.limit)
+        return msgspec.json.encode(Request(cases=cases, limits=limits, computation=resolved.computation))
     request = Request(
         cases={resolved.id: resolved.case},
         limits=limits,
@@ -93,17 +109,24 @@ def execute(task: bytes) -> tuple[bytes, bytes]:
 def _executed(asked: Request) -> tuple[bytes, bytes]:
     own.add_known(asked.beside)
     ((key, case),) = asked.cases.items()
-    try:
-        resolved = resolve(case)
-    except InputError as error:
-        raise UnfinishedRunError(f"{platform.node()} cannot run it: {error}") from None
-    if resolved.id != key:
-        raise UnfinishedRunError(_difference(asked.versions, resolved))
+    if (computation := asked.computation) is not None:
+        versions = {"python": platform.python_version(), "hbvm-bench": version_of("hbvm-bench")}
+        said = {"case": case, "role": "ours", "library": "hbvm-bench", "order": None, "versions": versions}
+        said["kernel"] = kernel_digest()
+        loads = None if computation.timed else ("a study", computation.folder)
+    else:
+        try:
+            resolved = resolve(case)
+        except InputError as error:
+            raise UnfinishedRunError(f"{platform.node()} cannot run it: {error}") from None
+        if resolved.id != key:
+            raise UnfinishedRunError(_difference(asked.versions, resolved))
+        case, method = resolved.case, resolved.method
+        said = {"case": case, **of_method(method), "versions": versions_of(method)}
+        said["kernel"] = kernel_digest() if is_ours(method) else ""
+        loads = method.library, parse_spec(case.problem).name
     with tempfile.TemporaryDirectory(prefix="hbvm-bench-") as scratch:
-        request = msgspec.structs.replace(
-            asked, cases={key: resolved.case}, core=getattr(_thread, "core", None)
-        )
-        loads = resolved.method.library, parse_spec(resolved.case.problem).name
+        request = msgspec.structs.replace(asked, cases={key: case}, core=getattr(_thread, "core", None))
         ended = start(Path(scratch), request, loads)
         result, series = _result(Path(scratch), ended, asked.limits)
     if result.reason == STALE:
@@ -114,18 +137,15 @@ def _executed(asked: Request) -> tuple[bytes, bytes]:
             f"{tempfile.gettempdir()} and in the cache, and run the same command again"
         )
     record = Record(
-        id=resolved.id,
-        case=resolved.case,
-        **of_method(resolved.method),
+        id=key,
+        **said,
         result=result,
         limits=asked.limits,
         seconds=round(ended.seconds, 3),
         peak_memory_gib=round(ended.peak_gib, 3),
         log=ended.output[-LOG_LENGTH:] if result.outcome == "crashed" else "",
-        versions=versions_of(resolved.method),
         machine=machine.describe(),
         finished=datetime.now(UTC).isoformat(timespec="seconds"),
-        kernel=kernel_digest() if is_ours(resolved.method) else "",
     )
     return msgspec.json.encode(record), series
 

@@ -16,10 +16,11 @@ from typing import Literal
 import msgspec
 import numpy as np
 
-from hbvm_bench.campaign import own
+from hbvm_bench.campaign import folder, own
 from hbvm_bench.campaign.file import Case, Limits, TimingPlan
 from hbvm_bench.campaign.identity import Resolved, fixed_step, resolve
 from hbvm_bench.measure import batch, ensemble, machine, memory, raw, timing
+from hbvm_bench.measure.computation import VALUE, Task, packed
 from hbvm_bench.measure.raw import Series
 from hbvm_bench.measure.timing import SingleRun, Timeable
 from hbvm_bench.run import ending
@@ -47,6 +48,35 @@ ENVIRONMENT = {
 }
 
 
+class Computation(msgspec.Struct, frozen=True, kw_only=True):
+    """One computation of a study.
+
+    Attributes
+    ----------
+    folder, place : str
+        Of the function that lists them, as in ``./blocks.py:tasks``.
+    key : str
+        Which of them.
+    quick : bool
+        Whether the run is quick.
+    timed : bool
+        Whether it takes times: it finds nothing loaded then, and nothing runs beside it.
+    limit : float
+        Seconds after which it is ended.
+    """
+
+    folder: str
+    place: str
+    key: str
+    quick: bool
+    timed: bool = False
+    limit: float = 3600.0
+
+    def tasks(self) -> dict[str, Task]:
+        """Return the tasks of the study, by their keys."""
+        return {task.key: task for task in folder.named(self.place, Path(self.folder))(self.quick)}
+
+
 class Request(msgspec.Struct, frozen=True, kw_only=True):
     """What travels to a worker, and before that to whichever machine shall start it.
 
@@ -69,6 +99,8 @@ class Request(msgspec.Struct, frozen=True, kw_only=True):
         Which of the plan's compilations they are of.
     core : int or None
         The core to stay on.
+    computation : Computation or None
+        What to do instead of an integration.
     """
 
     cases: dict[str, Case]
@@ -79,6 +111,7 @@ class Request(msgspec.Struct, frozen=True, kw_only=True):
     rounds: list[int] = []
     compilation: int = 0
     core: int | None = None
+    computation: Computation | None = None
 
 
 def work(path: Path, parent: int, warmth: Found = "nothing") -> None:
@@ -94,8 +127,11 @@ def work(path: Path, parent: int, warmth: Found = "nothing") -> None:
     # complex states are no states, and their real parts are not either
     warnings.simplefilter("error", np.exceptions.ComplexWarning)
     try:
-        if request.plan is None:
-            reply: object = _measured(request, path.parent, parent, warmth)
+        if request.computation is not None:
+            (path.parent / COMPILED).touch()
+            reply: object = _computed(request.computation, path.parent)
+        elif request.plan is None:
+            reply = _measured(request, path.parent, parent, warmth)
         else:
             reply = _time(request, request.plan, path.parent)
         with atomic(path.parent / REPLY) as temporary:
@@ -104,6 +140,18 @@ def work(path: Path, parent: int, warmth: Found = "nothing") -> None:
         if getattr(error.__cause__ or error, "errno", None) in DISK:
             sys.exit(NO_ROOM)
         raise
+
+
+def _computed(asked: Computation, directory: Path) -> Result:
+    try:
+        value = packed(asked.tasks()[asked.key].run())
+    except Exception as error:
+        traceback.print_exc()
+        last = traceback.extract_tb(error.__traceback__)[-1]
+        where = f"({Path(last.filename).name}, line {last.lineno})"
+        reason = f"failed with {type(error).__name__}: {error} {where}"
+        return Result(outcome="crashed", reason=" ".join(reason.split()))
+    return _stored(directory, Result(outcome="ok", status="finished"), {VALUE: value})
 
 
 def _measured(request: Request, directory: Path, parent: int, warmth: Found) -> Result:

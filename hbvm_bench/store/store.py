@@ -320,6 +320,12 @@ class Store:
             records.append(msgspec.structs.replace(record, case=words))
         return records
 
+    def computed(self) -> dict[str, Record]:
+        """Return the rows of the computations of a study, by their keys: the last of each."""
+        rows = self._rows("SELECT record FROM results WHERE run=? AND problem='' ORDER BY finished, rowid")
+        records = (decoded(text.encode(), Record) for (text,) in rows)
+        return {record.case.method: record for record in records}
+
     def everything(self) -> Iterator[Record]:
         """Yield all records of the run, those of earlier sources and other settings too."""
         for (text,) in self._rows("SELECT record FROM results WHERE run=? ORDER BY rowid"):

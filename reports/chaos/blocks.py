@@ -7,27 +7,19 @@ from statistics import median
 
 import numpy as np
 
+from hbvm_bench.measure.computation import Task, split
 from hbvm_bench.report.document import Claim, Items, Maker, Note, Section
-from hbvm_bench.report.page import Results, block
-from hbvm_bench.studies.chaos import exponents, figures, maps, orbits
-from hbvm_bench.studies.chaos.systems import SOURCES, SYSTEMS, Known, Published
-from hbvm_bench.studies.computations import (
-    Part,
-    PartResults,
-    Task,
-    claims_of,
-    computing,
-    load,
-    sections_of,
-    split,
-)
-from hbvm_bench.studies.drawn import number
+from hbvm_bench.report.figures.drawn import number
+from hbvm_bench.report.page import Results
+from hbvm_bench.report.parts import Part, PartResults, claims_of, sections_of, tasks_of
 from hbvm_bench.summaries.outcomes import OTHER_WORK
 from hbvm_bench.summaries.rows import seconds as in_words
 from hbvm_bench.summaries.table import NONE, Table
 from integrators.dynamics.lyapunov import INTERVALS
 
-NAME = "chaos"
+from . import exponents, figures, maps, orbits
+from .systems import SOURCES, SYSTEMS, Known, Published
+
 PIECES = 8  # of a map, for the processes to share
 
 
@@ -154,26 +146,23 @@ def parts(*, quick: bool) -> list[Part]:
     ]
 
 
-COMPUTATIONS = {"compute": computing(NAME, lambda quick: parts(quick=quick))}
+def tasks(quick: bool) -> list[Task]:
+    """Return the computations of a quick run, or of a whole one."""
+    return tasks_of(parts(quick=quick))
 
 
-@block
 def claims(run: Results) -> Section:
     """Return every published or exact value with the computed one."""
-    return claims_of(_parts(run), "Published and exact values", "Values", "published or exact")
+    return claims_of(_parts(run), run, "Published and exact values", "Values", "published or exact")
 
 
-@block
 def experiments(run: Results) -> list[Section]:
     """Return the section of each part."""
-    return sections_of(_parts(run))
+    return sections_of(_parts(run), run)
 
 
-def _parts(run: Results) -> list[tuple[Part, PartResults]]:
-    stored = load(NAME, run.beside)
-    records = {record.case.method: record for record in run.records}
-    quick = run.runs[-1].index.campaign.quick
-    return [(part, PartResults(part, stored, records)) for part in parts(quick=quick)]
+def _parts(run: Results) -> list[Part]:
+    return parts(quick=run.runs[-1].index.campaign.quick)
 
 
 def _none(results: PartResults) -> list[Claim]:

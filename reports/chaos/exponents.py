@@ -14,13 +14,14 @@ import numpy as np
 
 from hbvm_bench.measure import machine
 from hbvm_bench.measure.timing import busy, interleaved, load_between, no_collection
-from hbvm_bench.studies.chaos.systems import SKIP, SYSTEMS
 from integrators.dynamics.lyapunov import Exponents, lyapunov
 from integrators.dynamics.vectors import random_vectors
 from integrators.methods.hbvm import HBVM
 from integrators.protocol import Array, Status
 from problems import Problem, targets
 from problems.errors import InputError
+
+from .systems import SKIP, SYSTEMS
 
 METHOD = HBVM()
 TOLERANCE = 1e-15  # of heyoka, as in the race

@@ -8,15 +8,16 @@ from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 
 from hbvm_bench.report.figures.canvas import log_axis, say
+from hbvm_bench.report.figures.drawn import COLOURS, WIDTH, Said, drawn, heat
 from hbvm_bench.report.figures.style import INK, MUTED, TRUTH
-from hbvm_bench.studies.chaos import maps
-from hbvm_bench.studies.chaos.exponents import Measured
-from hbvm_bench.studies.chaos.orbits import Curves
-from hbvm_bench.studies.chaos.systems import SYSTEMS
-from hbvm_bench.studies.drawn import COLOURS, WIDTH, Said, drawn, heat
 from hbvm_bench.studies.paper.experiments.axis_motion import START
 from hbvm_bench.studies.paper.sitnikov_part import CRITICAL
 from integrators.protocol import Array
+
+from . import maps
+from .exponents import Measured
+from .orbits import Curves
+from .systems import SYSTEMS
 
 LOW, HIGH = np.log10(1.0), np.log10(30.0)  # of MEGNO's colours
 PALE = "#f4f1ee"  # on the map, whose colours no theme changes

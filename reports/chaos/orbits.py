@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 
 from hbvm_bench.measure.timing import busy, interleaved, load_between, no_collection
-from hbvm_bench.studies.chaos.systems import SYSTEMS
 from integrators.dynamics.indicators import Indicator, megno
 from integrators.dynamics.lyapunov import lyapunov
 from integrators.methods.gauss import Gauss
 from integrators.protocol import Array
 from problems import Hamiltonian, Problem, nbody
 from problems.catalogue.henon_heiles import henon_heiles
+
+from .systems import SYSTEMS
 
 LORENZ = Gauss(s=6, h=0.02)
 LORENZ_END, LORENZ_SKIP = 1000.0, 20.0

@@ -20,12 +20,13 @@ from typing import Any
 import numpy as np
 
 import problems
-from hbvm_bench.studies.costs.experiments import Times, taken_on_a_core
 from integrators import Gauss, integrate
 from integrators.protocol import Status
 from problems import Problem
 from problems.catalogue import kepler
 from problems.errors import InputError
+
+from .experiments import Times, taken_on_a_core
 
 SOURCE = Path(__file__).with_name("gauss8.c")
 FLAGS = ("-O3", "-march=native", "-ffp-contract=off", "-fno-math-errno", "-shared", "-fPIC")

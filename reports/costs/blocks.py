@@ -6,16 +6,14 @@ from functools import partial
 from statistics import median
 
 from hbvm_bench.campaign.spec import Spec
+from hbvm_bench.measure.computation import Task
 from hbvm_bench.measure.measured import POSITION
 from hbvm_bench.measure.timing import Spread
 from hbvm_bench.report import provenance
 from hbvm_bench.report.document import Items, Maker, Note, Section, attempt
-from hbvm_bench.report.page import Results, block
+from hbvm_bench.report.page import Results
+from hbvm_bench.report.parts import Part, PartResults, sections_of, tasks_of
 from hbvm_bench.store.records import Record
-from hbvm_bench.studies.computations import Part, PartResults, Task, computing, load, sections_of
-from hbvm_bench.studies.costs import experiments, variations
-from hbvm_bench.studies.costs.beside_c import ECCENTRICITY, IN_C, OURS, SOURCE, STEP, BesideC, beside_c
-from hbvm_bench.studies.costs.experiments import CALLED, FIRST, ON_LATTICES, STEPPED, Iterations, Times
 from hbvm_bench.summaries import compilations, outcomes, standings
 from hbvm_bench.summaries.goals import other_work, ratio_text
 from hbvm_bench.summaries.outcomes import OTHER_WORK
@@ -24,7 +22,10 @@ from hbvm_bench.summaries.rows import format_metric, grouped_by, status_of
 from hbvm_bench.summaries.table import NONE, Table
 from integrators.methods.hbvm import HBVM
 
-NAME = "costs"
+from . import experiments, variations
+from .beside_c import ECCENTRICITY, IN_C, OURS, SOURCE, STEP, BesideC, beside_c
+from .experiments import CALLED, FIRST, ON_LATTICES, STEPPED, Iterations, Times
+
 DEFAULT = "HBVM()"
 METRICS = ("warm_seconds", "steps", "evaluations", "energy_max", "position_end")
 SIZES, QUICK_SIZES = (10, 100, 1000, 4000), (10, 100)
@@ -105,10 +106,11 @@ def parts(*, quick: bool) -> list[Part]:
     ]
 
 
-COMPUTATIONS = {"compute": computing(NAME, lambda quick: parts(quick=quick))}
+def tasks(quick: bool) -> list[Task]:
+    """Return the computations of a quick run, or of a whole one."""
+    return tasks_of(parts(quick=quick))
 
 
-@block
 def tolerances(run: Results) -> list[Section]:
     """Return the times at looser tolerances, of HBVM and of its projection apart, with the errors."""
     members = ratios(run)
@@ -123,15 +125,11 @@ def tolerances(run: Results) -> list[Section]:
     return [Section("Looser tolerances", [note, *blocks], "tolerances", nav="Tolerances")]
 
 
-@block
 def beside(run: Results) -> list[Section]:
     """Return what was computed beside the cases."""
-    stored = load(NAME, run.beside)
-    quick = run.runs[-1].index.campaign.quick
-    return sections_of([(part, PartResults(part, stored)) for part in parts(quick=quick)])
+    return sections_of(parts(quick=run.runs[-1].index.campaign.quick), run)
 
 
-@block
 def conditions(run: Results) -> Section:
     """Return the processor, the other work while times were taken, and the compilations."""
     records = run.records
@@ -230,7 +228,7 @@ def iterations(counted: Mapping[int, Mapping[str, Iterations]], t_end: float) ->
         "Iterations per step on the discrete nonlinear Schroedinger equation",
         ("places", *heads),
         rows,
-        f"From a rough start to t = {t_end:g}: `hbvm_bench.studies.costs.lattice`.",
+        f"From a rough start to t = {t_end:g}: `reports/costs/lattice.py`.",
         words=(3, 6),
         key="costs-lattices",
     )

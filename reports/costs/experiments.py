@@ -17,11 +17,12 @@ from hbvm_bench.measure import machine
 from hbvm_bench.measure.timing import busy, interleaved, load_between, no_collection
 from hbvm_bench.run.task import empty_caches
 from hbvm_bench.run.worker import ENVIRONMENT
-from hbvm_bench.studies.costs.lattice import lattice
 from integrators import integrate, start
 from integrators.protocol import Status
 from integrators.solution import Solution
 from problems.errors import InputError
+
+from .lattice import lattice
 
 ON_LATTICES = ("HBVM(k=8, s=4, h=0.1)", "HBVM()")
 CALLED = ("HBVM()", "Gauss(s=8, h=0.1)", "Taylor()")

@@ -11,10 +11,10 @@ from functools import partial
 import numpy as np
 
 import problems
+from hbvm_bench.measure.computation import Task
 from hbvm_bench.measure.timing import Spread
 from hbvm_bench.report.document import Maker
-from hbvm_bench.studies.computations import Part, PartResults, Task
-from hbvm_bench.studies.costs.experiments import Times, finished, taken_on_a_core
+from hbvm_bench.report.parts import Part, PartResults
 from hbvm_bench.summaries.outcomes import OTHER_WORK
 from hbvm_bench.summaries.table import NONE, Table
 from integrators import HBVM, integrate
@@ -22,6 +22,8 @@ from integrators.protocol import Array
 from problems import targets
 from problems.errors import InputError
 from problems.problem import Problem
+
+from .experiments import Times, finished, taken_on_a_core
 
 KEY, TITLE = "variations", "Tangent vectors"
 END = 1000.0

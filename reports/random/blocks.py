@@ -3,24 +3,22 @@
 from collections.abc import Callable, Sequence
 from functools import partial
 from statistics import median
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
+from hbvm_bench.measure.computation import Task
 from hbvm_bench.report.document import Items, Maker, Note, Section
+from hbvm_bench.report.figures.drawn import WIDTH, Said, drawn
 from hbvm_bench.report.figures.style import INK, MUTED
-from hbvm_bench.report.page import Results, block
-from hbvm_bench.studies.computations import (
-    Part,
-    PartResults,
-    Task,
-    computing,
-    load,
-    sections_of,
-)
-from hbvm_bench.studies.drawn import WIDTH, Said, drawn
-from hbvm_bench.studies.random_hamiltonians.systems import COUNT, DRAWS, FAMILIES, SEED, family_of
-from hbvm_bench.studies.random_hamiltonians.trials import (
+from hbvm_bench.report.page import Results
+from hbvm_bench.report.parts import Part, PartResults, sections_of, tasks_of
+from hbvm_bench.summaries.rows import seconds as in_words
+from hbvm_bench.summaries.table import NONE, Table
+
+from .systems import COUNT, DRAWS, FAMILIES, SEED, family_of
+from .trials import (
     CRASHED,
     LIMIT,
     METHODS,
@@ -29,14 +27,13 @@ from hbvm_bench.studies.random_hamiltonians.trials import (
     SLOW_DRAWS,
     TOLERANCE,
     Outcome,
+    Reference,
     Trial,
-    outcomes,
+    asked,
+    reference,
+    trial,
 )
-from hbvm_bench.summaries.rows import seconds as in_words
-from hbvm_bench.summaries.table import NONE, Table
 
-NAME = "random"
-AT_ONCE = 2 * DRAWS  # problems of one process
 QUICK = (0, 52)  # problems of a quick run, and its methods
 QUICK_METHODS = ("HBVM()", "Taylor(tol=1e-10)", "DOP853(rtol=1e-10, atol=1e-06)")
 FACTORS = (10.0, 100.0, 1000.0)
@@ -46,12 +43,18 @@ Judge = Callable[[Outcome, Trial], float]
 
 def parts(*, quick: bool) -> list[Part]:
     """Return what is computed and shown, in a quick run or a whole one."""
-    pieces = [QUICK] if quick else [range(i, i + AT_ONCE) for i in range(0, COUNT, AT_ONCE)]
-    methods = QUICK_METHODS if quick else METHODS
-    tasks = [Task(f"of {i}", partial(outcomes, list(piece), methods)) for i, piece in enumerate(pieces)]
+    numbers, methods = (QUICK, QUICK_METHODS) if quick else (range(COUNT), METHODS)
+    references = [
+        Task(f"{number} reference", partial(reference, number), cost=2.0, limit=LIMIT) for number in numbers
+    ]
+    runs = [
+        Task(f"{number} {method}", partial(trial, number, method), limit=LIMIT)
+        for number in numbers
+        for method in asked(number, methods)
+    ]
 
     def blocks(results: PartResults) -> list[Maker]:
-        outcomes = [outcome for i in range(len(pieces)) for outcome in results[f"of {i}"]]
+        outcomes = [outcome_of(results, number, methods) for number in numbers]
         return [
             ("how often", lambda: wrong(outcomes, position, "position", POSITION)),
             ("the picture", lambda: picture(outcomes)),
@@ -62,23 +65,37 @@ def parts(*, quick: bool) -> list[Part]:
             ("how", lambda: Note(HOW)),
         ]
 
-    return [Part("trials", "Errors behind a success", tasks, lambda results: [], blocks)]
+    return [Part("trials", "Errors behind a success", [*references, *runs], lambda results: [], blocks)]
 
 
-COMPUTATIONS = {"compute": computing(NAME, lambda quick: parts(quick=quick))}
+def outcome_of(results: PartResults, number: int, methods: Sequence[str]) -> Outcome:
+    """Return what is stored of a problem; a process without an answer is a trial, too."""
+
+    def answer(name: str, ended: Callable[[str], Any]) -> Any:
+        outcome = results.outcome(name)
+        if outcome in ("ok", ""):
+            return results[name]
+        return ended(NO_ANSWER if outcome == "timeout" else CRASHED)
+
+    trials = [answer(f"{number} {method}", partial(Trial, method)) for method in asked(number, methods)]
+    truth = answer(f"{number} reference", lambda why: Reference(why=f"the reference: {why}"))
+    return Outcome(number, truth, trials)
 
 
-@block
+def tasks(quick: bool) -> list[Task]:
+    """Return the computations of a quick run, or of a whole one."""
+    return tasks_of(parts(quick=quick))
+
+
 def trials(run: Results) -> list[Section]:
     """Return the results."""
-    stored = load(NAME, run.beside)
-    quick = run.runs[-1].index.campaign.quick
-    return sections_of([(part, PartResults(part, stored)) for part in parts(quick=quick)])
+    return sections_of(parts(quick=run.runs[-1].index.campaign.quick), run)
 
 
 def position(outcome: Outcome, trial: Trial) -> float:
     """Return the error of the position over the condition number and the tolerance; NaN if not judged."""
-    return trial.position / (TOLERANCE * max(1.0, outcome.condition)) if outcome.judged else np.nan
+    expected = TOLERANCE * max(1.0, outcome.reference.condition)
+    return outcome.position_error(trial) / expected if outcome.judged else np.nan
 
 
 def energy(outcome: Outcome, trial: Trial) -> float:
@@ -96,7 +113,7 @@ def counted(outcomes: Sequence[Outcome], method: str, judge: Judge) -> tuple[int
         (outcome, trial)
         for outcome in outcomes
         for trial in outcome.trials
-        if trial.method == method and trial.status != REFUSED and outcome.end
+        if trial.method == method and trial.status != REFUSED and outcome.reference.end
     ]
     known = [(outcome, judge(outcome, trial), trial.success) for outcome, trial in asked]
     factors = [factor for _, factor, success in known if success and not np.isnan(factor)]
@@ -176,7 +193,7 @@ def picture(figure: Figure, outcomes: Sequence[Outcome]) -> Said:
 def endings(outcomes: Sequence[Outcome]) -> Table:
     """Return how the integrations ended, and their times."""
     rows = []
-    solved = [outcome for outcome in outcomes if outcome.end]
+    solved = [outcome for outcome in outcomes if outcome.reference.end]
     for method in METHODS:
         ended = [trial for outcome in solved for trial in outcome.trials if trial.method == method]
         ran = [trial for trial in ended if trial.status != REFUSED]
@@ -245,14 +262,14 @@ def left_out(outcomes: Sequence[Outcome]) -> Items:
     """Return which problems are not judged, and what was reported on those without a reference."""
     said: dict[str, list[int]] = {}
     for outcome in outcomes:
-        if not outcome.end:
+        if not outcome.reference.end:
             asked = [trial for trial in outcome.trials if trial.status != REFUSED]
             failed = [trial.method for trial in asked if not trial.success]
             who = "all" if not failed else f"all but {', '.join(failed)}"
             who = "none" if len(failed) == len(asked) else who
-            why = f"no reference: {outcome.why.rstrip('.')}. Success reported by {who}."
+            why = f"no reference: {outcome.reference.why.rstrip('.')}. Success reported by {who}."
         elif not outcome.judged:
-            why = f"condition number {outcome.condition:.1e}; positions are not judged."
+            why = f"condition number {outcome.reference.condition:.1e}; positions are not judged."
         else:
             continue
         said.setdefault(f"({family_of(outcome.number)}): {why}", []).append(outcome.number)
@@ -275,7 +292,7 @@ ENERGY = (
 )
 HOW = (
     f"{COUNT} problems of {len(FAMILIES)} families, drawn from the seed {SEED}: "
-    "`hbvm_bench.studies.random_hamiltonians.systems.problem(number)` returns each. Five problems in a row "
+    "`problem(number)` in `reports/random/systems.py` returns each. Five problems in a row "
     "have one formula and their own coefficients, initial state and interval; the intervals of shares "
     "take all as "
     f"independent. Every method is asked for {TOLERANCE:g}; `HBVM()`, `Taylor()` and `IAS15` choose their "

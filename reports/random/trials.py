@@ -1,10 +1,7 @@
-"""One random problem by every integrator, in a process that is ended where a library does not come back."""
+"""One random problem by one integrator, and the reference of a problem."""
 
-import multiprocessing
-import os
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
-from multiprocessing.connection import Connection
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from time import process_time
 
 import numpy as np
@@ -12,12 +9,13 @@ import numpy as np
 from hbvm_bench.campaign.identity import make_method
 from hbvm_bench.reference import trusted
 from hbvm_bench.reference.condition import conditions
-from hbvm_bench.studies.random_hamiltonians import systems
 from integrators import integrate
 from integrators.protocol import Array, MethodBase, Status
 from integrators.solution import Solution
 from problems import Problem, targets
 from problems.errors import InputError
+
+from . import systems
 
 TOLERANCE = 1e-10
 """What every integrator is asked for that takes a tolerance, and what all are judged by."""
@@ -49,7 +47,6 @@ SLOW = "Radau(rtol=1e-10, atol=1e-12)"
 SLOW_DRAWS = 2
 """The setting that takes seconds a problem, and of how many problems of each formula it is asked."""
 
-REFERENCE = "reference"
 REFUSED, NO_ANSWER, CRASHED = "refused", "no answer", "crashed"
 
 
@@ -66,13 +63,15 @@ class Trial:
     reason : str
         Of a failure, as the library gives it.
     position : float
-        Distance of the end from the reference over that of the reference from the origin; NaN without an end.
+        Of results that do not have ``end``: the error of the positions there, as `position_error` has it.
     energy : float
         Change of the energy over `energy_scale`; NaN where none is conserved.
     steps : int
         As the library counts them.
     seconds : float
         Processor seconds without compiling, of one run.
+    end : list of float
+        The state at the end; empty where it was not reached.
     """
 
     method: str
@@ -82,11 +81,31 @@ class Trial:
     energy: float = np.nan
     steps: int = 0
     seconds: float = np.nan
+    end: list[float] = field(default_factory=list)
 
     @property
     def success(self) -> bool:
         """Whether it says that it arrived."""
         return self.status == Status.FINISHED
+
+
+@dataclass(frozen=True)
+class Reference:
+    """Where a problem ends.
+
+    Attributes
+    ----------
+    condition : float
+        Condition number of the positions at the end; NaN without a reference.
+    why : str
+        Why there is no reference.
+    end : list of float
+        The state there, rounded to doubles; empty without a reference.
+    """
+
+    condition: float = np.nan
+    why: str = ""
+    end: list[float] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -96,123 +115,55 @@ class Outcome:
     Attributes
     ----------
     number : int
-        Of the problem, see `hbvm_bench.studies.random_hamiltonians.systems.problem`.
-    condition : float
-        Condition number of the positions at the end; NaN without a reference.
-    why : str
-        Why there is no reference.
-    end : list of float
-        The state there, rounded to doubles; empty without a reference.
+        Of the problem, see `systems.problem`.
+    reference : Reference
+        Where it ends.
     trials : list of Trial
         One for each setting that was asked.
     """
 
     number: int
-    condition: float = np.nan
-    why: str = ""
-    end: list[float] = field(default_factory=list)
+    reference: Reference
     trials: list[Trial] = field(default_factory=list)
 
     @property
     def judged(self) -> bool:
         """Whether errors at the tolerance leave three digits of the end."""
-        return bool(self.condition * TOLERANCE <= 1e-3)
+        return bool(self.reference.condition * TOLERANCE <= 1e-3)
+
+    def position_error(self, trial: Trial) -> float:
+        """Return the distance of an end from the reference over that of the reference from the origin."""
+        truth = np.array(self.reference.end)
+        if not trial.end or not truth.size:
+            return trial.position
+        half = truth.size // 2
+        away = np.array(trial.end)[:half] - truth[:half]
+        return float(np.linalg.norm(away) / np.linalg.norm(truth[:half]))
 
 
-def outcomes(
-    numbers: Sequence[int], methods: Sequence[str] = tuple(METHODS), limit: float = LIMIT
-) -> list[Outcome]:
-    """Return what integrators do on some problems.
-
-    Parameters
-    ----------
-    numbers : sequence of int
-        The problems; those of one formula in a row are compiled once.
-    methods : sequence of str
-        The settings, each as it prints.
-    limit : float
-        Seconds for each integration. A process that takes longer is ended: the integration has given no
-        answer, and another process goes on with the next.
-    """
-    results = {number: Outcome(number, why="not computed") for number in numbers}
-    left = [
-        (number, method)
-        for number in numbers
-        for method in (REFERENCE, *methods)
-        if method != SLOW or number % systems.DRAWS < SLOW_DRAWS
-    ]
-    while left:
-        for answer in _answers(left, results, limit):
-            number, method = left.pop(0)
-            result = results[number]
-            if isinstance(answer, Outcome):
-                results[number] = answer
-            elif isinstance(answer, Trial):
-                results[number] = replace(result, trials=[*result.trials, answer])
-            elif method == REFERENCE:
-                results[number] = replace(result, why=f"the reference: {answer}")
-            else:
-                results[number] = replace(result, trials=[*result.trials, Trial(method, answer)])
-    return list(results.values())
+def asked(number: int, methods: Sequence[str] = METHODS) -> list[str]:
+    """Return the settings that are asked of a problem."""
+    return [method for method in methods if method != SLOW or number % systems.DRAWS < SLOW_DRAWS]
 
 
-def _answers(
-    asked: Sequence[tuple[int, str]], known: dict[int, Outcome], limit: float
-) -> Iterator[Trial | Outcome | str]:
-    """Yield what a process answers, one by one; `NO_ANSWER` or `CRASHED` is the last."""
-    context = multiprocessing.get_context("spawn")
-    here, there = context.Pipe(duplex=False)
-    child = context.Process(target=_serve, args=(there, list(asked), dict(known)), daemon=True)
-    child.start()
-    there.close()
-    try:
-        here.recv()  # it has started
-        for _ in asked:
-            try:
-                answer = here.recv() if here.poll(limit) else NO_ANSWER
-            except EOFError:
-                answer = CRASHED
-            yield answer
-            if isinstance(answer, str):
-                return
-    finally:
-        child.kill()
-        child.join()
-        here.close()
-
-
-def _serve(there: Connection, asked: Sequence[tuple[int, str]], known: dict[int, Outcome]) -> None:
-    """Answer what is asked, in order; what libraries print is in no one's way."""
-    quiet = os.open(os.devnull, os.O_WRONLY)
-    for stream in (1, 2):
-        os.dup2(quiet, stream)
-    there.send("started")
-    for number, method in asked:
-        if method == REFERENCE:
-            known[number] = reference(number)
-            there.send(known[number])
-        else:
-            there.send(trial(method, systems.problem(number), np.array(known[number].end)))
-
-
-def reference(number: int) -> Outcome:
+def reference(number: int) -> Reference:
     """Return the end of a problem on which two computations of twice the digits agree, and its condition."""
     problem = systems.problem(number)
     try:
         opinions = trusted.ask(problem, np.array([problem.t0, problem.t_end]))
     except InputError as error:
-        return Outcome(number, why=str(error))
+        return Reference(why=str(error))
     if not opinions.apart[-1] <= AGREED:
-        return Outcome(number, why=f"two computations differ by {opinions.apart[-1]:.1e}")
+        return Reference(why=f"two computations differ by {opinions.apart[-1]:.1e}")
     end = np.array(opinions.states[-1], dtype=float)
     condition = conditions(problem, np.array([problem.t_end]), end[None])
     assert condition is not None  # all are Hamiltonian
-    return Outcome(number, float(condition[0]), end=end.tolist())
+    return Reference(float(condition[0]), end=end.tolist())
 
 
-def trial(text: str, problem: Problem, end: Array) -> Trial:
-    """Return what one integrator does on one problem; ``end`` is empty where it is not known."""
-    method = make_method(text)
+def trial(number: int, text: str) -> Trial:
+    """Return what one integrator does on one problem."""
+    problem, method = systems.problem(number), make_method(text)
     refused = method.accepts(problem)
     if refused is not None:
         return Trial(text, REFUSED, refused)
@@ -220,14 +171,11 @@ def trial(text: str, problem: Problem, end: Array) -> Trial:
     solution, seconds = _timed(problem, method)
     if seconds < AGAIN:
         solution, seconds = _timed(problem, method)
-    status, last = solution.status.value, solution.y[-1]
+    status, last, steps = solution.status.value, solution.y[-1], solution.stats.steps
     if solution.status is not Status.FINISHED or not np.isfinite(last).all():
-        return Trial(text, status, solution.reason, steps=solution.stats.steps, seconds=seconds)
-    position = np.nan
-    if end.size:
-        half = end.size // 2
-        position = float(np.linalg.norm(last[:half] - end[:half]) / np.linalg.norm(end[:half]))
-    return Trial(text, status, "", position, energy_change(problem, last), solution.stats.steps, seconds)
+        return Trial(text, status, solution.reason, steps=steps, seconds=seconds)
+    energy = energy_change(problem, last)
+    return Trial(text, status, energy=energy, steps=steps, seconds=seconds, end=last.tolist())
 
 
 def _timed(problem: Problem, method: MethodBase) -> tuple[Solution, float]:

@@ -7,11 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import problems
-from hbvm_bench.campaign.shipped.general import brusselator, decay_chain, diffusion, hires, lorenz
-from hbvm_bench.studies.costs.lattice import lattice
+from hbvm_bench.studies.general import brusselator, decay_chain, diffusion, hires, lorenz
 from integrators import HBVM, Gauss, integrate
 from integrators.protocol import Status
 from problems import Problem
+from tests.hbvm_bench.study_folders import module
+
+lattice = module("costs", "lattice").lattice
 
 RECORDED = Path(__file__).with_name("recorded.json")
 """The counts, which ``python -m tests.costs.record`` rewrites."""

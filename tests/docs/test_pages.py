@@ -42,7 +42,7 @@ def test_every_file_of_the_repository_that_a_page_names_is_there(page):
     named = re.findall(r"`((?:tests|examples|integrators|problems|hbvm_bench|docs)/[\w/]+\.\w+)`", text)
     examples = {
         "problems/catalogue/NAME.py",
-        "hbvm_bench/campaign/shipped/NAME.toml",
+        "hbvm_bench/studies/NAME.toml",
         "problems/catalogue/quartic.py",
         "docs/_build/html/index.html",  # what `make docs` builds
     }

@@ -2,21 +2,26 @@
 
 import io
 import re
+import sqlite3
+from contextlib import closing
 from dataclasses import dataclass
-from functools import partial
+from dataclasses import replace as replace_task
 from typing import get_type_hints
 
 import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from hbvm_bench.campaign.file import load
+from hbvm_bench.campaign import folder
+from hbvm_bench.campaign.file import load, shipped
 from hbvm_bench.cli import main
+from hbvm_bench.measure.computation import function_of, packed, unpacked
 from hbvm_bench.report.figures.canvas import new, small
-from hbvm_bench.store.store import PACKED, Store
-from hbvm_bench.studies import computations as results
-from hbvm_bench.studies.drawn import number
-from hbvm_bench.studies.paper import properties_part, report
+from hbvm_bench.report.figures.drawn import number
+from hbvm_bench.report.page import Results
+from hbvm_bench.report.parts import Part, PartResults
+from hbvm_bench.run import computing, executors
+from hbvm_bench.store.store import FILE, PACKED, Store
 from hbvm_bench.studies.paper.experiments import others
 from hbvm_bench.studies.paper.experiments.departure import departure
 from hbvm_bench.studies.paper.henon_heiles_part import fates
@@ -24,6 +29,8 @@ from integrators.methods.gauss import Gauss
 from integrators.protocol import Array, Samples, Status
 from problems import Hamiltonian
 from problems.errors import InputError
+
+report = folder.module(shipped()["paper"].parent, "blocks")
 
 
 @pytest.fixture
@@ -60,84 +67,67 @@ def test_a_failure_is_a_departure():
     assert departure(Failing(), 10.0, lambda y: y[:, 0] > 0, stretch=1.0) == 1.5  # type: ignore[arg-type]
 
 
+TASKS = """
+import functools
+from hbvm_bench.measure.computation import Task, split
+
 def square(i: int) -> int:
     if i == 3:
         raise ValueError("three is too many")
     return i**2
 
-
-def part(count: int) -> results.Part:
-    runs = [results.Task(f"{i}", partial(square, i), cost=i) for i in range(count)]
-    return results.Part("squares", "Squares", runs, lambda found: [], lambda found: [])
-
-
-def work(count: int) -> list[results.Task]:
-    return part(count).tasks
-
-
-def ran(tasks, directory, jobs=1):
-    """Run tasks and return what is kept, and what was said of those that ended, in order."""
-    said: dict[str, str] = {}
-    store = Store(directory)
-    store.prepare()
-    kept = results.run_all("paper", tasks, jobs, store, said.__setitem__)
-    return kept, said
-
-
-def stored(directory):
-    return results.load("paper", Store(directory).studies())
-
-
-@pytest.mark.parametrize("jobs", [1, 2])
-def test_tasks_give_the_same_results_here_and_in_processes(tmp_path, jobs):
-    kept, said = ran(work(3), tmp_path, jobs)
-    found = results.PartResults(part(3), stored(tmp_path))
-    assert [found["0"], found["1"], found["2"]] == [0, 1, 4]
-    assert stored(tmp_path) == kept
-    if jobs == 1:
-        assert list(said) == ["squares/2", "squares/1", "squares/0"]  # the long ones first
-
-
 def row(values: list[float]) -> list[float]:
     return [value + 1 for value in values]
 
-
-def test_what_was_divided_is_put_together_again(tmp_path):
-    runs = results.split("rows", row, [1.0, 2.0, 3.0, 4.0, 5.0], 2, cost=1)
-    whole = results.Part("p", "P", runs, lambda found: [], lambda found: [])
-    ran(whole.tasks, tmp_path)
-    assert results.PartResults(whole, stored(tmp_path))["rows"] == [2.0, 3.0, 4.0, 5.0, 6.0]
+def tasks(quick):
+    squares = [Task(f"squares/{i}", functools.partial(square, i), cost=i) for i in range(2 if quick else 4)]
+    return squares + split("squares/rows", row, [1.0, 2.0, 3.0, 4.0, 5.0], 2, cost=9)
+"""
 
 
-def test_a_computation_that_fails_loses_no_other_and_says_why(tmp_path):
-    ran(work(4), tmp_path)
-    found = results.PartResults(part(4), stored(tmp_path))
-    assert found["2"] == 4
-    with pytest.raises(InputError, match=r"'squares/3' failed with ValueError: three is too many \(test_pa"):
+@pytest.fixture
+def study(tmp_path):
+    """Return a folder with computations, one of which fails."""
+    (tmp_path / "blocks.py").write_text(TASKS)
+    return tmp_path
+
+
+def ran(study, store, *, quick=False):
+    """Run what is missing of the computations, and return the keys of those that ended, in order."""
+    campaign = replace(load("smoke"), computes="./blocks.py:tasks", quick=quick)
+    left = computing.missing(computing.plan(campaign, study), store)
+    with executors.opened(jobs=1) as pool:
+        return [row.case.method for row in computing.run(left, store, campaign, pool, lambda running: None)]
+
+
+def results_of(study, store):
+    runs = folder.module(study, "blocks").tasks(False)
+    bare = [replace_task(task, key=task.key.removeprefix("squares/")) for task in runs]
+    part = Part("squares", "Squares", bare, lambda found: [], lambda found: [])
+    return PartResults(
+        part,
+        Results(
+            [], [], {}, computed={key: (row, store.series(row.id)) for key, row in store.computed().items()}
+        ),
+    )
+
+
+def test_computations_run_as_cases_do_and_one_that_fails_says_why_and_is_tried_again(study):
+    store = Store(study / "run")
+    store.prepare()
+    keys = ran(study, store)
+    assert keys[-4:] == ["squares/3", "squares/2", "squares/1", "squares/0"]  # the long ones first
+    found = results_of(study, store)
+    assert [found["0"], found["1"], found["2"]] == [0, 1, 4]
+    assert found["rows"] == [2.0, 3.0, 4.0, 5.0, 6.0]  # what was divided is put together again
+    with pytest.raises(InputError, match=r"'squares/3' failed with ValueError: three is too many \(b"):
         found["3"]
-
-
-def test_a_run_goes_on_where_it_was_but_not_by_other_code(tmp_path):
-    ran(work(2), tmp_path)
-    assert list(ran(work(3), tmp_path)[1]) == ["squares/2"]
-    assert list(ran(work(3), tmp_path)[1]) == []
-    kept = stored(tmp_path)
-    Store(tmp_path).keep_study("paper", results.StoredResults(kept.results, {}, code="another"))
-    assert len(ran(work(3), tmp_path)[1]) == 3
-
-
-def test_a_failure_is_tried_again(tmp_path):
-    ran(work(4), tmp_path)
-    assert list(ran(work(4), tmp_path)[1]) == ["squares/3"]
-
-
-@pytest.mark.parametrize(
-    ("beside", "says"),
-    [({}, "were not run"), ({"paper": {"results": 3}}, "damaged"), ({"paper": {}}, "damaged")],
-)
-def test_what_is_missing_or_damaged_is_told(beside, says):
-    with pytest.raises(InputError, match=says):
-        results.load("paper", beside)
+    assert ran(study, store) == ["squares/3"]
+    (study / "blocks.py").write_text(TASKS.replace("i**2", "i**3"))
+    assert len(ran(study, store)) == 6  # by other code
+    assert results_of(study, store)["2"] == 8
+    with pytest.raises(InputError, match="'squares/7' was not run"):
+        results_of(study, store)["7"]
 
 
 @dataclass(frozen=True)
@@ -152,7 +142,7 @@ def mixed() -> dict[str, Mixed]:
 
 
 def test_what_is_kept_comes_back_to_the_last_bit():
-    back = results.unpacked(results.packed(mixed()), mixed)["one"]
+    back = unpacked(packed(mixed()), mixed)["one"]
     assert back.values.tobytes() == mixed()["one"].values.tobytes()
     assert back.values.shape == (2, 3)
     assert back.rows[0] == ("a", None)
@@ -161,8 +151,8 @@ def test_what_is_kept_comes_back_to_the_last_bit():
 
 def test_every_result_of_the_paper_can_be_kept():
     """Its function says what it returns; else it could not be read again."""
-    for task in (task for part in report.PARTS for task in part.tasks):
-        assert get_type_hints(results.function_of(task.run))["return"]
+    for task in report.tasks(quick=False):
+        assert get_type_hints(function_of(task.run))["return"]
 
 
 @pytest.mark.parametrize(
@@ -200,7 +190,7 @@ def small_paper(monkeypatch):
     """Return the campaign with one method, and one of the paper's parts."""
     campaign = load("paper")
     methods = [replace(campaign.methods[0], use=["HBVM(k=18, s=2, h=0.5)"])]
-    monkeypatch.setattr(report, "PARTS", (properties_part.PART,))
+    monkeypatch.setattr(report, "PARTS", (report.properties_part.PART,))
     monkeypatch.setattr("hbvm_bench.commands.paper.load", lambda name: replace(campaign, methods=methods))
 
 
@@ -220,9 +210,8 @@ def test_a_report_is_written_whole_drawn_again_and_loses_little_where_a_result_i
         for name in ("index.html", "report.md", PACKED):
             assert (tmp_path / "again" / name).read_bytes() == files[name], (place, name)
 
-    kept = stored(tmp_path)
-    del kept.results["claims/orders"]
-    Store(tmp_path).keep_study("paper", kept)
+    with closing(sqlite3.connect(tmp_path / FILE)) as database, database:
+        database.execute("DELETE FROM results WHERE method='claims/orders'")
     assert main(["report", str(tmp_path), "--out", str(tmp_path / "again")]) == 1
     assert (
         "not made: the order: InputError: the computation 'claims/orders' was not run."

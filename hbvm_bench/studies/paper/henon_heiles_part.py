@@ -10,18 +10,20 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator
 
+from hbvm_bench.measure.computation import Task, each, split
 from hbvm_bench.report.document import Claim, Maker
 from hbvm_bench.report.figures.canvas import log_axis, power_label, say
+from hbvm_bench.report.figures.drawn import COLOURS, WIDTH, Said, drawn, heat, legend_above, number
 from hbvm_bench.report.figures.over_time import envelope
 from hbvm_bench.report.figures.style import INK, MUTED, PAPER
-from hbvm_bench.studies.computations import Part, PartResults, Task, each, split
-from hbvm_bench.studies.drawn import COLOURS, WIDTH, Said, drawn, heat, legend_above, number
-from hbvm_bench.studies.paper.experiments import henon_heiles as experiment
-from hbvm_bench.studies.paper.experiments import others
-from hbvm_bench.studies.paper.experiments.henon_heiles import GAP, GAPS, NEIGHBOURS, T_END, H, Orbit, StepRow
+from hbvm_bench.report.parts import Part, PartResults
 from hbvm_bench.summaries.table import Table
 from integrators.protocol import Array
 from problems.catalogue.henon_heiles import ESCAPE, SADDLES
+
+from .experiments import henon_heiles as experiment
+from .experiments import others
+from .experiments.henon_heiles import GAP, GAPS, NEIGHBOURS, T_END, H, Orbit, StepRow
 
 METHODS = {"gauss": experiment.GAUSS, "hbvm": experiment.HBVM_4}
 LEVELS = (0.02, 0.05, 0.08, 0.11, 0.14, ESCAPE)

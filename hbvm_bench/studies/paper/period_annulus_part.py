@@ -7,14 +7,21 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from hbvm_bench.measure.computation import Task, each
 from hbvm_bench.report.document import Claim, Maker
 from hbvm_bench.report.figures.canvas import log_axis, say
+from hbvm_bench.report.figures.drawn import COLOURS, WIDTH, Said, drawn, legend_above, number
 from hbvm_bench.report.figures.style import INK, MUTED, TRUTH
-from hbvm_bench.studies.computations import Part, PartResults, Task, each
-from hbvm_bench.studies.drawn import COLOURS, WIDTH, Said, drawn, legend_above, number
-from hbvm_bench.studies.paper.experiments import others
-from hbvm_bench.studies.paper.experiments import period_annulus as experiment
-from hbvm_bench.studies.paper.experiments.period_annulus import (
+from hbvm_bench.report.parts import Part, PartResults
+from hbvm_bench.summaries.table import Table
+from integrators.methods.gauss import Gauss
+from integrators.methods.hbvm import HBVM
+from integrators.protocol import Array, MethodBase
+from problems.catalogue.period_annulus import C_STAR, H_STAR, P1, P2
+
+from .experiments import others
+from .experiments import period_annulus as experiment
+from .experiments.period_annulus import (
     DRAWN,
     NODES,
     PRINTED,
@@ -23,11 +30,6 @@ from hbvm_bench.studies.paper.experiments.period_annulus import (
     Path,
     energy,
 )
-from hbvm_bench.summaries.table import Table
-from integrators.methods.gauss import Gauss
-from integrators.methods.hbvm import HBVM
-from integrators.protocol import Array, MethodBase
-from problems.catalogue.period_annulus import C_STAR, H_STAR, P1, P2
 
 PROBLEM = (
     "A planar system of degree five with a centre in the origin; its periodic orbits end at a loop through "

@@ -7,14 +7,16 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from hbvm_bench.measure.computation import Task
 from hbvm_bench.report.document import Claim, Maker
 from hbvm_bench.report.figures.canvas import log_axis, say
+from hbvm_bench.report.figures.drawn import COLOURS, WIDTH, Said, drawn, number
 from hbvm_bench.report.figures.style import INK, MUTED, PAPER, TRUTH
-from hbvm_bench.studies.computations import Part, PartResults, Task
-from hbvm_bench.studies.drawn import COLOURS, WIDTH, Said, drawn, number
-from hbvm_bench.studies.paper.experiments import properties
-from hbvm_bench.studies.paper.experiments.properties import PAIRS, ErrorRow, Order
+from hbvm_bench.report.parts import Part, PartResults
 from hbvm_bench.summaries.table import Table
+
+from .experiments import properties
+from .experiments.properties import PAIRS, ErrorRow, Order
 
 PROBLEM = "The theory's statements, each measured on the paper's own polynomial problems."
 HBVM = COLOURS["hbvm"]

@@ -10,13 +10,14 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from hbvm_bench.report.figures.canvas import log_axis, say
+from hbvm_bench.report.figures.drawn import COLOURS, WIDTH, Said, drawn, heat, number
 from hbvm_bench.report.figures.style import INK, MUTED, PAPER, TRUTH
-from hbvm_bench.studies.drawn import COLOURS, WIDTH, Said, drawn, heat, number
-from hbvm_bench.studies.paper.experiments import axis_motion
-from hbvm_bench.studies.paper.experiments.axis_motion import START, Growth
-from hbvm_bench.studies.paper.experiments.sitnikov import DEGREE, T_END, E, StepRow
 from hbvm_bench.summaries.table import Table
 from integrators.protocol import Array
+
+from .experiments import axis_motion
+from .experiments.axis_motion import START, Growth
+from .experiments.sitnikov import DEGREE, T_END, E, StepRow
 
 FRACTIONS = {1 / n: f"1/{n}" for n in (32, 16, 12, 8, 4, 2)}
 LARGEST = 0.6  # step whose rotation is drawn

@@ -8,11 +8,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hbvm_bench.report.figures.canvas import log_axis
+from hbvm_bench.report.figures.drawn import COLOURS, WIDTH, Said, drawn
 from hbvm_bench.report.figures.over_time import envelope
 from hbvm_bench.report.figures.style import INK, MUTED, TRUTH
-from hbvm_bench.studies.drawn import COLOURS, WIDTH, Said, drawn
-from hbvm_bench.studies.paper.experiments.sitnikov import LOST, REVOLUTIONS, T_END, D, E, H, Orbit
 from integrators.protocol import Array
+
+from .experiments.sitnikov import LOST, REVOLUTIONS, T_END, D, E, H, Orbit
 
 TILT = 0.55  # of the oblique drawing of the configuration
 SHOWN = 350.0  # the interval on which the paper shows z(t)

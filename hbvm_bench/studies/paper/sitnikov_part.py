@@ -6,18 +6,20 @@ from itertools import takewhile
 
 import numpy as np
 
+from hbvm_bench.measure.computation import Task, each, split
 from hbvm_bench.report.document import Claim, Maker
+from hbvm_bench.report.figures.drawn import number
+from hbvm_bench.report.parts import Part, PartResults
 from hbvm_bench.store.records import Record, Value
-from hbvm_bench.studies.computations import Part, PartResults, Task, each, split
-from hbvm_bench.studies.drawn import number
-from hbvm_bench.studies.paper import sitnikov_beyond as beyond
-from hbvm_bench.studies.paper import sitnikov_figures as figures
-from hbvm_bench.studies.paper.experiments import axis_motion, others, sitnikov
-from hbvm_bench.studies.paper.experiments.axis_motion import Growth
-from hbvm_bench.studies.paper.experiments.sitnikov import Orbit, StepRow
 from hbvm_bench.summaries.rows import group_of, status_of
 from hbvm_bench.summaries.table import Table
 from integrators.protocol import Array
+
+from . import sitnikov_beyond as beyond
+from . import sitnikov_figures as figures
+from .experiments import axis_motion, others, sitnikov
+from .experiments.axis_motion import Growth
+from .experiments.sitnikov import Orbit, StepRow
 
 PROBLEM = (
     "Two primaries of mass 1 on ellipses with e = 0.75 and a planetoid of mass 1e-5 on the axis "

@@ -25,7 +25,7 @@ whose step size is fixed with epsilon = 0. heyoka's Taylor method and DOP853 alw
 size, WHFast and the leapfrog a fixed one, so each of these has one row.
 
 Every row has the same number of settings on every problem, declared before the run in
-hbvm_bench/campaign/shipped/race.toml. The fastest setting that is accurate enough is picked afterwards, by
+hbvm_bench/studies/race.toml. The fastest setting that is accurate enough is picked afterwards, by
 the same rule for every row. A ratio, and with it a goal, compares families, in rounds that did not choose
 the settings, and from the same number of settings of each: of a family with two rows (HBVM and Gauss, IAS15),
 every second setting of either row takes part, counted in the order of declaration. The

@@ -28,10 +28,29 @@ def with_page(store, **said):
 
 
 def test_every_shipped_campaign_names_blocks_that_are_there():
-    named = {name for campaign in map(load, shipped()) for name in campaign.page.blocks}
-    assert {"race.report:ratios", "endure:energy_over_time", "automatic:kinds"} <= named
-    for name in (*named, *DEFAULT):
-        assert callable(find(name))
+    named = {(name, path.parent) for path in shipped().values() for name in load(str(path)).page.blocks}
+    assert {"race.report:ratios", "./blocks.py:claims"} <= {name for name, _ in named}
+    for name, folder in (*named, *((name, None) for name in DEFAULT)):
+        assert callable(find(name, folder))
+
+
+def test_a_campaign_has_blocks_of_its_own_beside_its_file(store, tmp_path):
+    """What a file beside it names is run where its folder is given, and refused in a sentence elsewhere."""
+    (tmp_path / "rows.py").write_text("def count(results):\n    return len(results.records)\n")
+    (tmp_path / "blocks.py").write_text(
+        "from .rows import count\n\n\ndef table(results):\n    return f'{count(results)} cases.'\n"
+    )
+    index = store.index()
+    page_ = Page(blocks=["./blocks.py:table"])
+    store.write_index(replace(index, campaign=replace(index.campaign, page=page_)))
+    assert "3 cases." in markdown.markdown(document(store, tmp_path))
+    with pytest.raises(InputError, match="--study FOLDER"):
+        find("./blocks.py:table")
+    for name, why in (("./blocks.py:tables", "did you mean"), ("./block.py:table", "no file block.py")):
+        with pytest.raises(InputError, match=why):
+            find(name, tmp_path)
+    with pytest.raises(InputError, match=r"must be \./FILE\.py:NAME"):
+        find("./../blocks.py:table", tmp_path)
 
 
 def test_a_page_has_the_blocks_that_its_campaign_names_in_this_order(store):

@@ -9,11 +9,15 @@ from msgspec.structs import replace as with_fields
 from hbvm_bench.campaign.file import load
 from hbvm_bench.campaign.shorter import quick_run
 from hbvm_bench.cli import main
-from hbvm_bench.studies.chaos import exponents, maps, orbits, report
-from hbvm_bench.studies.chaos.systems import SKIP, SYSTEMS
 from hbvm_bench.summaries.table import NONE
 from integrators import lyapunov
 from problems import targets
+from tests.hbvm_bench.study_folders import REPORTS, module
+
+exponents, maps, orbits, report = (
+    module("chaos", name) for name in ("exponents", "maps", "orbits", "blocks")
+)
+SKIP, SYSTEMS = module("chaos", "systems").SKIP, module("chaos", "systems").SYSTEMS
 
 
 @pytest.mark.parametrize("name", [name for name, one in SYSTEMS.items() if one.divergence is not None])
@@ -109,24 +113,23 @@ def test_maps_tell_regular_from_chaotic_starts():
 
 def test_a_quick_run_computes_and_draws_everything(tmp_path, monkeypatch):
     few = {name: SYSTEMS[name] for name in ("thomas", "henon_heiles")}
-    for module in (report, report.figures):
-        monkeypatch.setattr(module, "SYSTEMS", few)
+    for where in (report, report.figures):
+        monkeypatch.setattr(where, "SYSTEMS", few)
     monkeypatch.setattr(orbits, "PLANETS", {"regular": orbits.PLANETS["regular"]})
-    campaign = load("chaos")
+    campaign = load(str(REPORTS / "chaos"))
     one = with_fields(campaign.methods[0], use=["Gauss(s=8, h=0.5)"])
-    monkeypatch.setattr(
-        "hbvm_bench.commands.paper.load", lambda name: with_fields(campaign, name=name, methods=[one])
-    )
-    assert main(["chaos", "--quick", "--jobs", "1", "--out", str(tmp_path)]) == 0
-    text = (tmp_path / "report" / "report.md").read_text(encoding="utf-8")
+    monkeypatch.setattr("hbvm_bench.commands.run.load", lambda name: with_fields(campaign, methods=[one]))
+    place = ["--quick", "--jobs", "1", "--out", str(tmp_path), "--report", str(tmp_path)]
+    assert main(["run", str(REPORTS / "chaos"), *place]) == 0
+    text = (tmp_path / "report.md").read_text(encoding="utf-8")
     assert "Thomas, b = 0.18: the largest exponent" in text
     assert "| regular: a = 7, e = 0.05 | REBOUND, WHFast |" in text
-    drawn = (tmp_path / "report" / "index.html").read_text(encoding="utf-8")
+    drawn = (tmp_path / "index.html").read_text(encoding="utf-8")
     for key in ("values", "megno", "sitnikov", "sections", "asteroids"):
         assert f'id="chaos-{key}' in drawn
         assert f"(figures/chaos-{key}.svg)" in text
 
 
 def test_a_quick_run_of_a_campaign_without_times_takes_none():
-    assert quick_run(load("chaos")).timing.rounds == 0
+    assert quick_run(load(str(REPORTS / "chaos"))).timing.rounds == 0
     assert quick_run(load("sitnikov")).timing.rounds > 0

@@ -8,16 +8,17 @@ from msgspec.structs import replace
 from hbvm_bench.campaign.file import load
 from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.cli import main
+from hbvm_bench.measure.computation import packed, unpacked
 from hbvm_bench.reference import solutions
 from hbvm_bench.report.document import Note
 from hbvm_bench.store.records import Load
-from hbvm_bench.studies.computations import packed, unpacked
-from hbvm_bench.studies.costs import beside_c, experiments, report
-from hbvm_bench.studies.costs.experiments import Iterations, Times
-from hbvm_bench.studies.costs.report import Ratio
 from hbvm_bench.summaries.points import PROJECTION
 from hbvm_bench.summaries.table import Table
 from tests.hbvm_bench import made_up_run
+from tests.hbvm_bench.study_folders import REPORTS, module
+
+beside_c, experiments, report = (module("costs", name) for name in ("beside_c", "experiments", "blocks"))
+Iterations, Times, Ratio = experiments.Iterations, experiments.Times, report.Ratio
 
 DEFAULT = made_up_run.record("HBVM(tol=3e-16)", [1.0, 2.0, 4.0])
 LOOSE = made_up_run.record("HBVM(tol=0.001)", [0.8, 1.7, 3.2])
@@ -29,7 +30,7 @@ def members(*records):
 
 
 def test_its_five_problems_have_a_reference_at_their_ends():
-    entries = load("costs").entries()
+    entries = load(str(REPORTS / "costs")).entries()
     assert len(entries) == 5
     for entry in entries:
         problem = make_problem(entry.use)
@@ -123,8 +124,8 @@ def test_without_a_c_compiler_the_block_says_so(monkeypatch, command, words):
 
 @pytest.mark.slow
 def test_a_quick_run_computes_and_draws_everything(tmp_path):
-    command = ["run", "costs", "--quick", "--jobs", "1", "--out", str(tmp_path), "--report", str(tmp_path)]
-    assert main(command) == 0
+    place = ["--quick", "--jobs", "1", "--out", str(tmp_path), "--report", str(tmp_path)]
+    assert main(["run", str(REPORTS / "costs"), *place]) == 0
     text = (tmp_path / "report.md").read_text(encoding="utf-8")
     assert "Time relative to HBVM(): HBVM(projection='energy')" in text
     assert "Kepler's problem, e = 0.6" in text

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from hbvm_bench.studies.computations import packed, unpacked
-from hbvm_bench.studies.costs import report, variations
-from hbvm_bench.studies.costs.experiments import Times
+from hbvm_bench.measure.computation import packed, unpacked
 from integrators import HBVM, integrate
+from tests.hbvm_bench.study_folders import module
 
+report, variations = module("costs", "blocks"), module("costs", "variations")
+Times = module("costs", "experiments").Times
 pytest.importorskip("heyoka")
 
 

@@ -6,10 +6,14 @@ from msgspec.structs import replace as with_fields
 
 from hbvm_bench.campaign.file import load
 from hbvm_bench.cli import main
-from hbvm_bench.studies.computations import packed, unpacked
-from hbvm_bench.studies.random_hamiltonians import report, systems, trials
-from hbvm_bench.studies.random_hamiltonians.trials import CRASHED, NO_ANSWER, REFERENCE, Outcome, Trial
+from hbvm_bench.report.page import Results
+from hbvm_bench.report.parts import PartResults
 from problems import Hamiltonian, Problem
+from tests.hbvm_bench import made_up_run
+from tests.hbvm_bench.study_folders import REPORTS, module
+
+report, systems, trials = (module("random", name) for name in ("blocks", "systems", "trials"))
+Outcome, Trial = trials.Outcome, trials.Trial
 
 
 def test_two_hundred_problems_of_forty_formulas_are_the_same_for_everybody():
@@ -46,7 +50,8 @@ def test_a_constant_in_the_energy_does_not_change_what_its_error_is_relative_to(
 
 
 def outcome(number, condition, *made):
-    return Outcome(number, condition, end=[1.0, 0.0], trials=[Trial("HBVM()", *rest) for rest in made])
+    truth = trials.Reference(condition, end=[1.0, 0.0])
+    return Outcome(number, truth, [Trial("HBVM()", *rest) for rest in made])
 
 
 MADE = [
@@ -54,7 +59,7 @@ MADE = [
     outcome(1, 10.0, ("finished", "", 2e-9, 3e-12, 10, 1.0)),
     outcome(2, 1e9, ("finished", "", 0.5, 1e-9, 10, 1.0)),  # too ill conditioned for a verdict
     outcome(3, 1.0, ("refused",)),
-    Outcome(4, why="none", trials=[Trial("HBVM()", "finished")]),
+    Outcome(4, trials.Reference(why="none"), [Trial("HBVM()", "finished")]),
 ]
 
 
@@ -89,25 +94,32 @@ def test_intervals_of_shares_are_those_of_wilson():
     assert report.share(0, 0) == "–"
 
 
-@pytest.mark.parametrize(("number", "limit", "answer"), [(0, 0.0, NO_ANSWER), (10**9, 60.0, CRASHED)])
-def test_a_process_that_does_not_answer_is_ended(number, limit, answer):
-    assert list(trials._answers([(number, REFERENCE)], {}, limit)) == [answer]
+def test_a_process_without_an_answer_is_a_trial_that_says_so():
+    def row(outcome):
+        return made_up_run.record("HBVM()", outcome=outcome), {}
+
+    names = [task.key for task in report.tasks(quick=True)]
+    ended = {name: row("timeout" if name.endswith("HBVM()") else "crashed") for name in names}
+    (part,) = report.parts(quick=True)
+    results = PartResults(part, Results([], [], {}, computed=ended))
+    outcome = report.outcome_of(results, 52, report.QUICK_METHODS)
+    assert [made.status for made in outcome.trials] == [trials.NO_ANSWER, trials.CRASHED, trials.CRASHED]
+    assert outcome.reference.why == "the reference: crashed"
 
 
-def test_what_came_out_is_read_again():
-    (task,) = report.parts(quick=True)[0].tasks
-    assert unpacked(packed(MADE[:2]), task.run) == MADE[:2]
+def test_the_error_of_a_position_is_relative_to_the_distance_from_the_origin():
+    known = outcome(0, 1.0)
+    assert known.position_error(Trial("HBVM()", "finished", end=[1.5, 7.0])) == 0.5
+    assert known.position_error(Trial("HBVM()", "finished", position=0.25)) == 0.25
 
 
 @pytest.mark.slow
 def test_a_quick_run_computes_and_draws_everything(tmp_path, monkeypatch):
-    campaign = load("random")
+    campaign = load(str(REPORTS / "random"))
     one = with_fields(campaign.methods[0], use=["HBVM()"], quick=[])
-    monkeypatch.setattr(
-        "hbvm_bench.commands.run.load", lambda name: with_fields(campaign, name=name, methods=[one])
-    )
-    command = ["run", "random", "--quick", "--jobs", "1", "--out", str(tmp_path), "--report", str(tmp_path)]
-    assert main(command) == 0
+    monkeypatch.setattr("hbvm_bench.commands.run.load", lambda name: with_fields(campaign, methods=[one]))
+    place = ["--quick", "--jobs", "1", "--out", str(tmp_path), "--report", str(tmp_path)]
+    assert main(["run", str(REPORTS / "random"), *place]) == 0
     text = (tmp_path / "report.md").read_text(encoding="utf-8")
     # two problems; SciPy's default atol is wrong on both, the others on none
     assert "| `HBVM()` | 0 of 2: 0.0%" in text

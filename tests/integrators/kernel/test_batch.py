@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import problems
-from hbvm_bench.studies.costs.lattice import lattice
 from integrators import HBVM, integrate
 from integrators.coefficients.legendre import legendre
 from integrators.kernel import batch
@@ -18,6 +17,9 @@ from integrators.kernel.program import AdaptiveProgram, HBVMProgram
 from integrators.protocol import Status
 from problems import Hamiltonian, Problem, VectorField
 from problems.errors import InputError
+from tests.hbvm_bench.study_folders import module
+
+lattice = module("costs", "lattice").lattice
 
 rng = np.random.default_rng(7)
 

@@ -7,13 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hbvm_bench.studies.paper.experiments.departure import departure, first, step_states
 from integrators import integrate
 from integrators.methods.gauss import Gauss
 from integrators.methods.hbvm import HBVM
 from integrators.protocol import Array, MethodBase
 from problems import Problem
 from problems.catalogue.henon_heiles import henon_heiles, inside_triangle
+
+from .departure import departure, first, step_states
 
 H, T_END = 1.0, 5e4
 GAUSS = Gauss(s=2, h=H)

@@ -7,13 +7,14 @@ from functools import partial
 import numpy as np
 
 from hbvm_bench.campaign.identity import make_method
-from hbvm_bench.studies.paper.experiments import henon_heiles, period_annulus
 from hbvm_bench.summaries.table import NONE, Table
 from integrators import Solution, integrate
 from integrators.protocol import MethodBase
 from problems import Problem
 from problems.catalogue.henon_heiles import beyond_triangle
 from problems.errors import InputError
+
+from . import henon_heiles, period_annulus
 
 # Every family has the same number of settings here: one, chosen by us for accuracy; and
 # the paper's two methods, at the paper's steps. heyoka's compact mode compiles in less

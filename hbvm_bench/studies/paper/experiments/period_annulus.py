@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hbvm_bench.studies.paper.experiments.departure import departure, step_states
 from integrators.methods.gauss import Gauss
 from integrators.methods.hbvm import HBVM
 from integrators.protocol import Array, MethodBase, Program
 from problems import targets
 from problems.catalogue.period_annulus import C_STAR, H_STAR, P1, period_annulus
+
+from .departure import departure, step_states
 
 TOLERANCE = 2.0**-52
 SPAN, SHORT_SPAN = 2500.0, 100.0

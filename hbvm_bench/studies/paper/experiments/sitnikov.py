@@ -8,13 +8,14 @@ import numpy as np
 
 import problems
 from hbvm_bench.reference import solutions
-from hbvm_bench.studies.paper.experiments.departure import departure, first
 from integrators import Solution, integrate, registry
 from integrators.methods.gauss import Gauss
 from integrators.methods.hbvm import HBVM
 from integrators.protocol import Array, MethodBase
 from problems import Problem
 from problems.errors import InputError
+
+from .departure import departure, first
 
 E, D = 0.75, 5.0
 H, T_END = 0.5, 1500.0

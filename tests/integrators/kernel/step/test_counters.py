@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import problems
-from hbvm_bench.campaign.shipped.general import decay_chain, diffusion
+from hbvm_bench.studies.general import decay_chain, diffusion
 from integrators import HBVM, Gauss, integrate
 
 CASES = {
