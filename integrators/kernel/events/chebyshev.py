@@ -49,7 +49,7 @@ def keeps_away(search, degree):
         sizes += abs(get(search.coefficients, j))
     constant = abs(search.coefficients[0])
     varying_part = total(sizes) - constant
-    return constant - varying_part > NEAR * (constant + varying_part)
+    return constant - varying_part > max(NEAR * (constant + varying_part), search.errors[search.event])
 
 
 @compiled
@@ -98,6 +98,12 @@ def keep_samples(search, degree):
 
 
 @compiled
+def near(search):
+    """Return the value below which an extremum may reach zero."""
+    return max(NEAR * search.scale, search.errors[search.event])
+
+
+@compiled
 def suspect(search):
     """Whether zeros are possible; set `Search.scale`."""
     p, whole = search.fine, search.n // 8 * 8
@@ -115,4 +121,4 @@ def suspect(search):
     for i in range(whole, search.n):
         low, high, least = min(low, p[i]), max(high, p[i]), min(least, abs(p[i]))
     search.scale = max(abs(low), abs(high))
-    return search.n > 0 and ((low <= 0.0 and high >= 0.0) or least < NEAR * search.scale)
+    return search.n > 0 and ((low <= 0.0 and high >= 0.0) or least < near(search))

@@ -33,13 +33,13 @@ from integrators.kernel.events.sample import (
     time_at,
     weigh_first,
 )
+from integrators.kernel.events.series import take_series
 from integrators.kernel.events.value import context, forget_states, noise_at, state_at, value_at
 from integrators.kernel.events.zeros import find_zeros
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.parts.events import CHANGE
 from integrators.kernel.simd.lanes import two_sum
-from integrators.kernel.step.fixed_point import project
 from integrators.kernel.step.sample import write
 from integrators.kernel.step.sums import time_of_step
 
@@ -166,7 +166,7 @@ def keep_ends(search):
 @compiled
 def look(ctx, search):
     """Find the events up to `Search.stop`; return GOING or why that could not be done."""
-    project(ctx, ctx.tables.projection, ctx.tables.groups)
+    take_series(ctx, search)
     whole(ctx, search)
     sample_first(ctx, search)
     degree = search.degree

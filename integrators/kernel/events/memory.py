@@ -32,7 +32,11 @@ class Search(Memory):
     limits = Array("count", kind=int)  # the occurrence that ends the integration; 0: none
     dim = Integer()
     parameters = Integer()
-    terms = Integer()  # of the step's polynomial
+    terms = Integer()  # of the polynomial on which is looked
+    groups = Integer()  # of eight of them
+    series = Array(8, "dim", "groups")  # their coefficients
+    gauss = Array(16)  # eight nodes, and the weights there of the term that the step has not
+    node_times = Array(16)
     chunks = Integer()  # of eight first samples
     degree = Integer()  # of the polynomials through the first samples; a power of 2
     steps = Pointer()  # the compiled steps, for partial ones
@@ -98,6 +102,7 @@ class Search(Memory):
     end_value = Real()
     resolution = Real()  # part of the stretch that times can be told apart by
     sampled = Array("count", FINEST)  # values of each function at the first samples, but for the first
+    errors = Array("count")  # what the last term makes of each, where the step itself has none like it
     times = Array(8)
     block = Array("dim", 8)  # states, one in a column
     outputs = Array(16)  # values of a function on a block; [8]: 1 where it has raised

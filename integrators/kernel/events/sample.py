@@ -51,22 +51,24 @@ def put_nodes(search, chunk, degree):
 
 
 @compiled
-def weigh(ctx, c, table):
-    """Set the weights of the step's polynomial at eight parts ``c`` of it: for slopes, then for positions.
+def weigh(ctx, c, terms, table):
+    """Set the weights of so many terms of a polynomial at eight parts ``c`` of the step: for slopes, positions.
 
-    See `integrators.kernel.step.sample.interpolate`, which has the formulas.
+    See `integrators.kernel.step.sample.interpolate`, which has the formulas. With s = 1 the mean of the second
+    term is no part of a position, which would not arrive at the step's end with it.
     """
     x = 2.0 * c - 1.0
     lower, here = splat8(0.0), c
     before, legendre = splat8(1.0), x
-    for j in range(ctx.s):
+    for j in range(terms):
         after = ((2.0 * j + 3.0) * x * legendre - (j + 1.0) * before) / (j + 2.0)
         upper = splat8(0.0)
-        if j + 1 < ctx.s:
+        if j + 1 < terms:
             upper = (after - before) / (2.0 * (2.0 * j + 3.0) ** 0.5)
         weight = 0.5 * here
         if j > 0:
-            weight = lower / (-2.0 * (4.0 * j * j - 1.0) ** 0.5)
+            mean = 0.0 if j == ctx.s and j == 1 else 1.0
+            weight = mean * lower / (-2.0 * (4.0 * j * j - 1.0) ** 0.5)
         put(table, 16 * j, here)
         put(table, 16 * j + 8, weight + upper / (2.0 * (4.0 * (j + 1.0) * (j + 1.0) - 1.0) ** 0.5))
         lower, here = here, upper
@@ -74,26 +76,25 @@ def weigh(ctx, c, table):
 
 
 @compiled
-def combine8(ctx, row, table):
+def combine8(search, row, terms, table):
     """Return the sum of a row's coefficients times the weights in every other vector of a table."""
-    gamma, group = ctx.scratch.coefficients, 8 * ctx.padded
+    gamma, group = search.series, 8 * search.dim
     total = splat8(0.0)
-    for j in range(ctx.s):
-        i = ctx.tables.first + j
-        total = fma(get(table, 16 * j), spread(gamma, (i // 8) * group + 8 * row + i % 8), total)
+    for j in range(terms):
+        total = fma(get(table, 16 * j), spread(gamma, (j // 8) * group + 8 * row + j % 8), total)
     return total
 
 
 @compiled
-def interpolate8(ctx, c, table, block):
-    """Write the polynomial of the solved step at eight parts of it; the coefficients are set."""
+def interpolate8(ctx, search, c, terms, table, block):
+    """Write so many terms of the solved step's polynomial at eight parts of it."""
     rows, h, state, error = ctx.rows, ctx.h, ctx.state, ctx.error
     for d in range(rows):
-        moved = h * combine8(ctx, d, table)
+        moved = h * combine8(search, d, terms, table)
         if ctx.second:
             i = 8 * (d // 4) + d % 4
             drift = c * (ctx.factors.drift[i] * state[i])
-            bent = (ctx.factors.row[d] * h) * combine8(ctx, d, table + 8)
+            bent = (ctx.factors.row[d] * h) * combine8(search, d, terms, table + 8)
             put(block, 8 * d, state[i + 4] + (drift + (error[i + 4] + bent)))
             put(block, 8 * (rows + d), state[i] + (error[i] + moved))
         else:
@@ -101,17 +102,18 @@ def interpolate8(ctx, c, table, block):
 
 
 @compiled
-def fill(ctx, search, chunk, degree, known):
+def fill(ctx, search, chunk, degree, terms, known):
     """Put states to the block: at samples 1 + 8 chunk and those that follow, the exact one at the end."""
     start, end, time, low = search.start, search.end, search.time, search.time_low
     put_nodes(search, chunk, degree)
     put(search.times, 0, start + get(search.times, 0) * (end - start))
     c = ((get(search.times, 0) - time) - low) * (1.0 / ctx.h)
+    weights = search.weights
     if known == 0:
-        weigh(ctx, c, search.weights)
-        interpolate8(ctx, c, search.weights, search.block)
+        weigh(ctx, c, terms, weights)
     else:
-        interpolate8(ctx, c, search.first_weights + 16 * search.terms * chunk, search.block)
+        weights = search.first_weights + 16 * terms * chunk
+    interpolate8(ctx, search, c, terms, weights, search.block)
     if 8 * chunk + 8 == degree:
         search.times[7] = end
         for d in range(search.dim):
@@ -123,7 +125,7 @@ def weigh_first(ctx, search):
     """Set the weights at the first samples of a whole step."""
     for chunk in range(search.chunks):
         put_nodes(search, chunk, search.degree)
-        weigh(ctx, get(search.times, 0), search.first_weights + 16 * search.terms * chunk)
+        weigh(ctx, get(search.times, 0), search.terms, search.first_weights + 16 * search.terms * chunk)
 
 
 @compiled
@@ -143,7 +145,7 @@ def call(ctx, search, event):
 def sample(ctx, search, degree):
     """Set `Search.values` of the function that is looked for, at more samples of the stretch."""
     for chunk in range(degree // 8):
-        fill(ctx, search, chunk, degree, 0)
+        fill(ctx, search, chunk, degree, search.terms, 0)
         call(ctx, search, search.event)
         for i in range(8):
             search.values[1 + 8 * chunk + i] = search.outputs[i]
@@ -153,14 +155,25 @@ def sample(ctx, search, degree):
 
 @compiled
 def sample_first(ctx, search):
-    """Set `Search.sampled` of all functions."""
+    """Set `Search.sampled` and `Search.errors` of all functions."""
     degree, known = search.degree, search.mode == WHOLE
     for chunk in range(search.chunks):
-        fill(ctx, search, chunk, degree, 1 if known else 0)
+        fill(ctx, search, chunk, degree, search.terms, 1 if known else 0)
         for event in range(search.count):
             call(ctx, search, event)
             for i in range(8):
                 search.sampled[FINEST * event + 8 * chunk + i] = search.outputs[i]
+    if search.terms == ctx.s:
+        return
+    for event in range(search.count):
+        search.errors[event] = 0.0
+    for chunk in range(search.chunks):
+        fill(ctx, search, chunk, degree, ctx.s, 0)
+        for event in range(search.count):
+            call(ctx, search, event)
+            for i in range(8):
+                error = abs(search.outputs[i] - search.sampled[FINEST * event + 8 * chunk + i])
+                search.errors[event] = max(search.errors[event], error if is_finite(error) else 0.0)
 
 
 @compiled

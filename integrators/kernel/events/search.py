@@ -27,9 +27,11 @@ from integrators.kernel.events.memory import (
     WHOLE,
     Search,
 )
+from integrators.kernel.events.series import NODES
 from integrators.kernel.native.memory import aligned
 from integrators.protocol import Array, Status, UserError
 
+LOW = 4  # below this degree of the method's polynomial one term more is looked for; see `series`
 LEAST, MOST = 8, 16  # samples in a step to begin with; more where these do not show the function
 HITS, NUMBERS = 1024, 1 << 17  # occurrences, and components of their states, that are kept until Python asks
 LASTING = ("ends", "touched", "finite", "happened", "recent", "due", "due_directions", "action_state")
@@ -74,12 +76,17 @@ def search_memory(
     own, partial = contexts
     dim, n_par = own.shape.dim, own.par.size
     degree = 1 << (min(max(2 * own.s, LEAST), MOST) - 1).bit_length()
+    terms = own.s + 1 if own.s < LOW else own.s
     numbers = {
-        "count": len(events), "dim": dim, "degree": degree, "chunks": degree // 8, "terms": own.s,
-        "parameters": n_par, "made_rows": 1 + dim + n_par, "last": end, "sign": sign,
+        "count": len(events), "dim": dim, "degree": degree, "chunks": degree // 8, "terms": terms,
+        "groups": -(-terms // 8), "parameters": n_par, "made_rows": 1 + dim + n_par, "last": end, "sign": sign,
     }  # fmt: skip
     cosines, transforms = _tables()
     memory = Search(numbers, {"cosines": cosines})
+    if terms > own.s:
+        x, weights = np.polynomial.legendre.leggauss(NODES)
+        polynomial = np.polynomial.legendre.Legendre.basis(own.s)(x) * (2.0 * own.s + 1.0) ** 0.5
+        memory.gauss[:] = np.append((1.0 + x) / 2.0, polynomial * weights / 2.0)
     memory.own, memory.partial, memory.steps = own, partial, steps.code()
     memory.transforms, memory.functions = transforms, functions
     memory.actions = [actions.get(name) for name in events]

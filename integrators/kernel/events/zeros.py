@@ -4,7 +4,7 @@ The polynomial of a step is cheap and only of order s + 1. So it says where zero
 states at the ends of partial steps say where they are.
 """
 
-from integrators.kernel.events.chebyshev import NEAR
+from integrators.kernel.events.chebyshev import near
 from integrators.kernel.events.memory import FINEST, TINY
 from integrators.kernel.events.sample import is_finite, sign
 from integrators.kernel.events.solve import (
@@ -66,12 +66,19 @@ def add_low(search, i):
 
 
 @compiled
+def error_of_polynomial(search):
+    """Return by how much the polynomial may differ from the function, with room."""
+    return CLEAR_OF_ZERO * search.truncation + search.errors[search.event]
+
+
+@compiled
 def find_lows(search, first, last):
     """Note the points inside a run of one sign where the polynomial turns back from near zero.
 
-    Near the ends of the stretch its parabola may miss a corner, but not that coefficients are missing.
+    Near the ends of the stretch its parabola may miss a corner, or a turn that lies beyond the end by error,
+    but not that coefficients are missing.
     """
-    p, end, least, corner = search.fine, search.n - 1, NEAR * search.scale, CLEAR_OF_ZERO * search.truncation
+    p, end, least, corner = search.fine, search.n - 1, near(search), error_of_polynomial(search)
     search.low_count = 0
     if last - first < 2:
         return
@@ -142,7 +149,7 @@ def mark_low(ctx, search, low, way):
     x, p = search.points[low], search.fine[low]
     value = value_at(ctx, search, x)
     # Between these it may fall by as much as it rises, at a corner, which the polynomial also rounds.
-    margin = CLEAR_OF_ZERO * search.truncation
+    margin = error_of_polynomial(search)
     for i in range(max(low - 1, 0), min(low + 2, search.n)):
         margin = max(margin, abs(search.fine[i] - p))
     margin += CLEAR_OF_ZERO * abs(value - p)

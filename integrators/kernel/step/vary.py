@@ -77,8 +77,8 @@ MOST_GROWTH = FARTHEST  # of the length from one step to the next, at most
 TARGET_ITERATIONS = 18.0
 # The implicit solver takes over after so many steps in a row that the iteration keeps from growing where the
 # errors would allow so much longer ones. Its steps cost one or two of 18 iterations through memory, and ten
-# of those of few rows or of the second-order form; the more rows, the more. Beyond MOST_ROWS they are too
-# expensive to be tried where only low coefficients tell how much longer.
+# of those of few rows or of the second-order form; the more rows, the more, up to MOST_ROWS: beyond, the
+# factors are sparse.
 LIMITED_STEPS = 8
 LIMITED_GROWTH = 1.2
 GAIN, GAIN_LIGHT, GAIN_PER_ROW, MOST_ROWS = 3.0, 6.0, 0.1, 64
@@ -204,7 +204,7 @@ def count_limited_steps(ctx, factor):
     slow = 0
     if factor < LIMITED_GROWTH:
         much = room > LEAST_WORTH and room > log_worth(ctx)
-        if not much and ctx.rows <= MOST_ROWS:
+        if not much:
             decay = log_decay(ctx)
             much = decay < 0.0 and log(ctx.estimate.error_decay) - decay > log_worth(ctx)
         slow = ctx.implicit.slow + 1 if much else 0
