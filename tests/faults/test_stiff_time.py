@@ -10,7 +10,7 @@ END = 20.0
 
 
 def draw(rng, rows):
-    """Return a stiff system that follows a smooth function of time: decays, or a diffusion with its boundary."""
+    """Return a stiff system that follows a smooth function of time: decays, or a diffusion."""
     frequency, size = rng.uniform(0.2, 2.0), rng.uniform(0.5, 2.0)
 
     def forcing(t, m):

@@ -52,10 +52,10 @@ def put_nodes(search, chunk, degree):
 
 @compiled
 def weigh(ctx, c, terms, table):
-    """Set the weights of so many terms of a polynomial at eight parts ``c`` of the step: for slopes, positions.
+    """Set the weights of a polynomial's terms at eight parts ``c`` of the step: for slopes, and for positions.
 
-    See `integrators.kernel.step.sample.interpolate`, which has the formulas. With s = 1 the mean of the second
-    term is no part of a position, which would not arrive at the step's end with it.
+    See `integrators.kernel.step.sample.interpolate`, which has the formulas. With s = 1 the mean of the
+    second term is no part of a position, which would not arrive at the step's end with it.
     """
     x = 2.0 * c - 1.0
     lower, here = splat8(0.0), c

@@ -79,7 +79,8 @@ def search_memory(
     terms = own.s + 1 if own.s < LOW else own.s
     numbers = {
         "count": len(events), "dim": dim, "degree": degree, "chunks": degree // 8, "terms": terms,
-        "groups": -(-terms // 8), "parameters": n_par, "made_rows": 1 + dim + n_par, "last": end, "sign": sign,
+        "groups": -(-terms // 8), "parameters": n_par, "made_rows": 1 + dim + n_par,
+        "last": end, "sign": sign,
     }  # fmt: skip
     cosines, transforms = _tables()
     memory = Search(numbers, {"cosines": cosines})

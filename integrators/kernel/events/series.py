@@ -1,9 +1,9 @@
-"""The polynomial on which zeros are looked for: that of the solved step, and where s is small one term more.
+"""The polynomial on which zeros are looked for: that of the solved step, where s is small one term more.
 
-The states at zeros are ends of partial steps, which differ from the step's own polynomial by O(h^(s + 1)). With
-s = 1 that is as much as a solution bends within a step: positions go along straight lines, and do not turn back
-inside. The coefficient gamma_s of the field on that polynomial takes the difference down to O(h^(s + 2)).
-Stages tell it; Gauss methods, whose P_s is 0 at the nodes, evaluate the field at others.
+States at zeros are ends of partial steps, which differ from the step's own polynomial by O(h^(s + 1)). With
+s = 1 that is as much as a solution bends within a step: positions go along straight lines, and do not turn
+back inside. The coefficient gamma_s of the field on that polynomial takes the difference down to
+O(h^(s + 2)). Stages tell it; Gauss methods, whose P_s is 0 at the nodes, evaluate the field at others.
 """
 
 from integrators.kernel.events.sample import interpolate8, is_finite, weigh
