@@ -8,7 +8,7 @@ PIP     = $(BIN)/python -m pip install --quiet --disable-pip-version-check
 REPORTS ?= sitnikov
 STUDIES ?=
 
-.PHONY: bench examples pages reports test test-all test-aarch64 docs lint format venv lock clean
+.PHONY: bench evidence examples pages reports test test-all test-aarch64 docs lint format venv lock clean
 
 bench: venv  ## run Sitnikov through every integrator: results and report in runs/sitnikov/, where git does not look
 	$(BIN)/hbvm-bench run sitnikov --report runs/sitnikov/report
@@ -19,6 +19,14 @@ examples: venv  ## the fourteen tasks beside other libraries: writes examples/me
 reports: venv  ## write the committed reports of campaigns, REPORTS="sitnikov drift ...", from runs/; what is missing there runs
 	for name in $(REPORTS); do $(BIN)/hbvm-bench run $$name --report reports/$$name || exit 1; done
 	for name in $(STUDIES); do $(BIN)/hbvm-bench run reports/$$name --report reports/$$name || exit 1; done
+
+EVIDENCE ?= sitnikov automatic race work-precision endure drift encounters general large ensemble paper peers \
+  reports/chaos reports/random reports/costs
+
+evidence: venv  ## every study and its report, with one version of the code on a quiet machine; goes on where it was stopped
+	$(BIN)/hbvm-bench doctor
+	for study in $(EVIDENCE); do $(BIN)/hbvm-bench run $$study --report reports/$${study#reports/} || exit 1; done
+	$(BIN)/hbvm-bench report --index reports
 
 pages: venv  ## draw reports/*/index.html from the archives that lie there; nothing is run
 	$(BIN)/hbvm-bench report --pages reports

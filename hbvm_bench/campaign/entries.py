@@ -62,6 +62,9 @@ class TimingPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     compilations : int
         Of interleaved times: fresh processes with empty caches among which the rounds are shared, for one
         compilation of a method may be slower than the next. Those that choose a setting do not compare it.
+    front : bool
+        Whether a setting that the first compilation shows to be far behind another one of its method is not
+        timed again; see `hbvm_bench.run.front`.
     """
 
     rounds: Annotated[int, Meta(ge=0, le=10_000)] = 3
@@ -72,6 +75,7 @@ class TimingPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     order: Literal["shuffled", "alternating"] = "shuffled"
     clock: Literal["wall", "thread", "process"] = "wall"
     compilations: Annotated[int, Meta(ge=1, le=100)] = 1
+    front: bool = False
 
 
 class Checks(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):

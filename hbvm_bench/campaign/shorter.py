@@ -54,7 +54,9 @@ def with_rounds(campaign: Campaign, rounds: int | None) -> Campaign:
     if not rounds:
         return campaign
     compilations = max(1, min(campaign.timing.compilations, rounds // 2))
-    return replace(campaign, timing=replace(campaign.timing, rounds=rounds, compilations=compilations))
+    front = campaign.timing.front and compilations > 1
+    timing = replace(campaign.timing, rounds=rounds, compilations=compilations, front=front)
+    return replace(campaign, timing=timing)
 
 
 def quick_run(campaign: Campaign) -> Campaign:

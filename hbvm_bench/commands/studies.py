@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Sequence
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -16,11 +17,13 @@ from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.commands.listing import as_json as run_as_json
 from hbvm_bench.commands.run import as_typed, carry_out, refuse_died
 from hbvm_bench.measure import machine
+from hbvm_bench.measure.computation import VALUE, packed
 from hbvm_bench.report import terminal
 from hbvm_bench.store.files import ensure_writable
 from hbvm_bench.store.store import Store
 from hbvm_bench.studies.race.families import FIXED, OURS, row_of
-from hbvm_bench.studies.race.probe import PROBES, Probe, probe
+from hbvm_bench.studies.race.probe import probe
+from hbvm_bench.studies.race.probe import row_of as row_of_probes
 from hbvm_bench.summaries import goals
 from problems.errors import InputError
 
@@ -114,18 +117,14 @@ def race_as_data(races: "Sequence[Race]") -> dict[str, Any]:
 
 
 def _probe(campaign: Campaign, store: Store) -> None:
-    """Measure compile times, and add them to those of problems that were not run this time."""
-    fresh: list[Probe] = []
+    """Measure compile times; those of problems that were not run this time stay."""
     for entry in campaign.entries():
         cases = chosen(campaign, [name_of(entry)]).cases()
         families = list(dict.fromkeys(row_of(case).family for case in cases))
         ours = next(case for case in cases if row_of(case) == (OURS, FIXED))
         h = float(parse_spec(ours.method).arguments["h"])
-        fresh += probe(name_of(entry), ours.problem, h, families)
-    names = {measured.problem for measured in fresh}
-    before = msgspec.convert(store.studies().get(PROBES, []), list[Probe])
-    kept = [*(measured for measured in before if measured.problem not in names), *fresh]
-    store.keep_study(PROBES, kept)
+        row = row_of_probes(name_of(entry), machine.describe(), version("hbvm-bench"))
+        store.save(row, {VALUE: packed(probe(name_of(entry), ours.problem, h, families))})
 
 
 def _declare(campaign: Campaign, *, error: bool) -> None:

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from hbvm_bench.measure import drift
 from hbvm_bench.measure.measured import POSITION, Measured
+from hbvm_bench.measure.observables import observables
 from hbvm_bench.store.records import Value
 from problems.errors import unknown
 
-PLANETOID_Z = 8  # component of Sitnikov's state
 LOADED = "another case had loaded it; the timing pass measures it"
 
 Quantity = Callable[[Measured], float | str]
@@ -43,7 +43,6 @@ class Metric:
     scale: Literal["log", "linear"] = "log"  # for axes and number formats
     same_trajectory: bool = False  # excluded where a symmetry guard is violated
     whole_interval: bool = True  # excluded for a case that ended early
-    problem: str | None = None  # the only problem that has it, if it is not for all
 
 
 METRICS: dict[str, Metric] = {}
@@ -76,9 +75,7 @@ def guard_violation(measured: Measured) -> str:
 
 def evaluate(measured: Measured) -> dict[str, Value]:
     """Return the metrics of a case that apply to its problem, by key."""
-    return {
-        m.key: _value(m, measured) for m in METRICS.values() if m.problem in (None, measured.problem.name)
-    }
+    return {m.key: _value(m, measured) for m in METRICS.values()}
 
 
 def _value(metric: Metric, measured: Measured) -> Value:
@@ -229,7 +226,7 @@ def position_end(m: Measured) -> float | str:
 @metric("position error", "position, max", "relative", same_trajectory=True)
 def position_max(m: Measured) -> float | str:
     """The same, the largest over the times of the stored reference."""
-    return _no_reference(m) or _largest(m.position, m.position_t)
+    return _not_compared(m) or _largest(m.position, m.position_t)
 
 
 @metric("mean position error", "position, mean", "relative", same_trajectory=True)
@@ -240,7 +237,7 @@ def position_mean(m: Measured) -> float | str:
     if why := _no_reference_at_end(m):
         return why
     with np.errstate(divide="ignore"):
-        return float(np.exp(np.mean(np.log(m.position[m.position_t != m.problem.t0]))))
+        return float(np.exp(np.mean(np.log(m.position))))
 
 
 @metric("phase error at the end", "phase", "time", same_trajectory=True)
@@ -252,26 +249,30 @@ def phase_end(m: Measured) -> float | str:
 @metric("phase error", "phase, max", "time", same_trajectory=True)
 def phase_max(m: Measured) -> float | str:
     """The same, the largest over the times of the stored reference."""
-    return _no_reference(m) or _largest(m.phase, m.position_t)
+    return _not_compared(m) or _largest(m.phase, m.position_t)
 
 
-@metric(
-    "z at the end", "z(end)", "length",
-    better=None, scale="linear", same_trajectory=True, problem="sitnikov",
-)  # fmt: skip
-def z_end(m: Measured) -> float | str:
-    """Position of the planetoid on the axis at the end time."""
-    return float(m.y[-1, PLANETOID_Z]) if m.complete else f"ended at t = {m.t_stop:.4g}"
+@metric("observable at the end", "observable", "", better=None, scale="linear", same_trajectory=True)
+def observable_end(m: Measured) -> float | str:
+    """Value at the end time of the first quantity that the problem declares (Sitnikov: the planetoid's height
+    on the axis).
+    """
+    known = list(observables(m.problem).values())
+    if not known:
+        return "the problem declares no observable"
+    return float(known[0](m.y[-1:])[0]) if m.complete else f"ended at t = {m.t_stop:.4g}"
 
 
-@metric("error of z at the end", "z error", "length", same_trajectory=True, problem="sitnikov")
-def z_error(m: Measured) -> float | str:
-    """Distance of z at the end time from the stored 128-bit reference."""
+@metric("error of the observable at the end", "obs. error", "", same_trajectory=True)
+def observable_error(m: Measured) -> float | str:
+    """Distance of this quantity at the end time from that of the stored 128-bit reference."""
+    known = list(observables(m.problem).values())
+    if not known:
+        return "the problem declares no observable"
     if (why := _no_reference_at_end(m)) or m.reference is None:
         return why
     (last,) = np.flatnonzero(m.reference.t == m.t[-1])
-    high, low = m.reference.high[last, PLANETOID_Z], m.reference.low[last, PLANETOID_Z]
-    return abs(float((m.y[-1, PLANETOID_Z] - high) - low))
+    return abs(float((known[0](m.y[-1:]) - known[0](m.reference.high[last : last + 1]))[0]))
 
 
 @metric("largest distance", "distance", "length", better=None)
@@ -387,14 +388,16 @@ def _largest_of(series: list[NDArray[np.float64]], m: Measured) -> float | str:
     return next((value for value in largest if isinstance(value, str)), None) or max(largest)
 
 
-def _no_reference(m: Measured) -> str:
-    return "no stored reference for this problem" if m.reference is None else ""
+def _not_compared(m: Measured) -> str:
+    """Return why no position was compared after the start, else ``""``."""
+    if m.reference is None:
+        return "no stored reference for this problem"
+    return "" if m.position_t.size else "the stored reference has none of the run's times after the start"
 
 
 def _no_reference_at_end(m: Measured) -> str:
     if m.reference is not None and not m.complete:
         return f"ended at t = {m.t_stop:.4g}"
-    if m.reference is not None and (m.position_t.size == 0 or m.position_t[-1] != m.t[-1]):
-        ends = f"ends at t = {m.position_t[-1]:.6g}" if m.position_t.size else "has none of the run's times"
-        return f"the reference {ends}; nothing was compared after it"
-    return _no_reference(m)
+    if m.position_t.size and m.position_t[-1] != m.t[-1]:
+        return f"the reference ends at t = {m.position_t[-1]:.6g}; nothing was compared after it"
+    return _not_compared(m)

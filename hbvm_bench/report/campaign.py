@@ -9,7 +9,6 @@ from weakref import WeakKeyDictionary
 from msgspec.structs import replace
 
 from hbvm_bench.campaign.identity import make_problem
-from hbvm_bench.measure.metrics import METRICS
 from hbvm_bench.reference import solutions
 from hbvm_bench.report import provenance, words
 from hbvm_bench.report.document import (
@@ -30,7 +29,7 @@ from hbvm_bench.report.stored import PLACE
 from hbvm_bench.store.records import Record
 from hbvm_bench.store.store import PACKED
 from hbvm_bench.summaries import accuracies, compilations, goals, growth, needs, outcomes
-from hbvm_bench.summaries.points import by_family, family_of
+from hbvm_bench.summaries.points import family_of
 from hbvm_bench.summaries.rows import Task, columns, grouped_by, tasks
 from hbvm_bench.summaries.table import Table
 
@@ -157,14 +156,13 @@ def sources(results: Results) -> Section:
 
 
 def _overall(results: Results, *, several: bool) -> list[Block]:
-    records, look = results.records, results.look
+    records = results.records
     title = "Over all problems" if several else "Which integrator to take"
-    numbers = {name: look[each[0].case.method].number for name, each in by_family(records).items()}
     blocks = attempt(
         ("which integrator for which need", partial(needs.table, records)),
         ("which integrator on which problem", partial(_outcomes, records)),
         ("the growth of the energy error", partial(growth.table, records)),
-        ("performance profiles", partial(profiles, records, numbers)),
+        ("performance profiles", partial(profiles, records)),
     )
     return [Section(title, blocks, "overview", nav="Over all problems" * several)] if blocks else []
 
@@ -200,10 +198,11 @@ def what_came_out(results: Results) -> Section:
         counts = Counter(re.split("[,:]", title)[0].lower() for title in titles)
         said = ", ".join(f"{outcome}: {count}" for outcome, count in counts.items())
         blocks.append(f"{len(records)} cases on {len(parts)} problems; {said}.")
-    said = [(item.short, item.unit or "–", f"{item.label}. {item.description}") for item in METRICS.values()]
+    shown = columns(records)
+    said = [(item.short, item.unit or "–", f"{item.label}. {item.description}") for item in shown]
     meaning = Table("", ("column", "unit", "meaning"), said, words=(0, 1, 2))
     blocks += [
-        CaseTable(columns(records), [item.ranked for item in parts], results.look),
+        CaseTable(shown, [item.ranked for item in parts], results.look),
         Details("What the columns mean", [meaning]),
     ]
     return Section("Results", blocks, "results", nav="Results")

@@ -32,7 +32,7 @@ from hbvm_bench.summaries.rows import Cell, Row, seconds
 
 HERE = "hbvm_bench.report"
 READING = "docs/howto/reading_a_report.md"
-SCRIPTS = ("script.js", "table.js", "motion.js", "figures.js")
+SCRIPTS = ("script.js", "table.js", "figures.js")
 TOGETHER, ONE_PAGE = 4, 100  # problems and rows; with more of both each problem has a page of its own
 INLINE = 150_000  # characters of drawings in the text of a page; a script unpacks the others
 # By matplotlib's name of a marker: its drawing in a box of 12 by 12 as the figures have it.
@@ -54,7 +54,7 @@ MARKERS = {
     "*": '<path d="M6 .8 7.4 4.4 11.2 4.6 8.2 7 9.3 10.8 6 8.6 2.7 10.8 3.8 7 .8 4.6 4.6 4.4z"/>',
 }
 FITTING = 9  # columns of metrics in a window of 1280 pixels; of more, these wait behind a switch
-MINOR = ("compile_seconds", "z_end")
+MINOR = ("compile_seconds", "observable_end")
 DIGITS = 16  # of a double: a bar of this many digits is full
 ENLARGED = 1.72  # pixels per point: a figure of a whole line fills the page's column
 LEAST = 1.3  # pixels per point below which a drawing is scrolled rather than made smaller

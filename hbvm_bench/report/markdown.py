@@ -64,8 +64,10 @@ def printed(block: Block, level: int = 2, shown: Collection[str] = ()) -> str:
             table = lined([words(head) for head in block.flat_head], rows, block.words)
             return joined((f"**{words(block.title)}**" * bool(block.title), table, words(block.note)))
         case Picture():
+            if block.key not in shown:
+                return ""
             title = words(block.title)
-            image = f"![{title}]({block.file})" if block.key in shown else ""
+            image = f"![{title}]({block.file})"
             return joined((f"{heading} {title}", image, words(block.summary), words(block.caption)))
 
 

@@ -1,4 +1,4 @@
-"""What a page carries beside its text, packed: most of its figures, their numbers, and what it moves."""
+"""What a page carries beside its text, packed: most of its figures, and their numbers."""
 
 import base64
 import gzip
@@ -21,11 +21,9 @@ def packed(data: bytes) -> str:
 
 def data(document: Document, drawings: Mapping[str, str]) -> str:
     """Return what the figures of a page are made of, packed; ``drawings`` are those not in its text."""
-    content: dict[str, dict[str, Any]] = {"drawings": dict(drawings), "numbers": {}, "motions": {}}
+    content: dict[str, dict[str, Any]] = {"drawings": dict(drawings), "numbers": {}}
     for picture in document.pictures:
         if (table := picture.numbers) is not None:
             said = {"head": table.head, "rows": table.rows, "words": len(table.words)}
             content["numbers"][picture.key] = said
-        if picture.motion is not None:
-            content["motions"][picture.key] = picture.motion
     return packed(msgspec.json.encode(content))

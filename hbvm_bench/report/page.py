@@ -66,8 +66,6 @@ class Results:
         The computations of a study with what they returned, by their keys.
     study : Path or None
         The folder of the campaign's file, where its own blocks are.
-    beside : dict
-        What a study keeps beside its cases, by name.
     """
 
     runs: list[StoredRun]
@@ -76,7 +74,6 @@ class Results:
     figures: Sequence[tuple[str, str]] = ()
     computed: dict[str, tuple[Record, Series]] = field(default_factory=dict)
     study: Path | None = None
-    beside: dict[str, object] = field(default_factory=dict)
 
     @property
     def page(self) -> Page:
@@ -179,14 +176,13 @@ def gather(stores: Stores, study: Path | None = None) -> Results:
             last = store
         series[key] = reading.drawn(record, store.series(key)) if number < DRAWN_CASES else {}
         records.append(record)
-    beside = {name: value for store in stores for name, value in store.studies().items()}
     computed = {
         key: (record, store.series(record.id)) for store in stores for key, record in store.computed().items()
     }
     name = indices[0].campaign.name
     if study is None and name in shipped():
         study = shipped()[name].parent
-    return Results(runs, records, series, stores[0].figures(), computed, study, beside)
+    return Results(runs, records, series, stores[0].figures(), computed, study)
 
 
 def document(stores: Store | Stores, study: Path | None = None) -> Document:

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from hbvm_bench.campaign.file import Case
 from hbvm_bench.campaign.identity import make_problem
-from hbvm_bench.measure.metrics import PLANETOID_Z
+from hbvm_bench.measure.observables import observables
 from hbvm_bench.measure.raw import WITNESSES
 from hbvm_bench.reference import solutions
 from hbvm_bench.reference.solutions import Reference
 from hbvm_bench.report import words
 from hbvm_bench.report.document import Block, Details, Items, Maker, Ranked, Section, attempt
-from hbvm_bench.report.figures import motion, over_time, portraits, views
+from hbvm_bench.report.figures import over_time, portraits, views
 from hbvm_bench.report.figures.canvas import Picture, styled
 from hbvm_bench.report.figures.drift import drift_figure
 from hbvm_bench.report.figures.over_time import Drawn, OverTime
@@ -127,16 +127,13 @@ def _makers(
         ("Work and precision", lambda: work_precision(cases)),
         ("Energy drift", lambda: drift_figure(main)),
     ]
-    if problem.name == "sitnikov" and not brief:
-        makers.append(("The system in space", lambda: motion.still(cases, "The system in space")))
     makers += [errors(spec) for spec in (OVER_TIME[:1] if brief else (*OVER_TIME, *_other_invariants(cases)))]
     makers += [
         ("Phase portrait", lambda: portraits.portrait(problem, main)),
         ("Section", lambda: portraits.section(problem, main)),
     ]
     if not brief:
-        own = views.VIEWS.get(problem.name or "", ())
-        makers += [("A view of this problem", lambda view=view: view(problem, cases, known)) for view in own]
+        makers.append(("The observable", lambda: views.observed(problem, cases, known)))
         makers.append(("Step sizes", lambda: views.step_sizes(cases)))
     return makers
 
@@ -224,7 +221,8 @@ def _truth(problem: Problem, known: Reference | None) -> Items | None:
             "Errors of the reference solution rounded to doubles, the smallest errors a run can show: "
             f"{least}"
         )
-    if problem.name == "sitnikov" and known.t[-1] == problem.t_end:
-        z = known.high[-1, PLANETOID_Z]
-        said.insert(0, f"Reference value of z at t = {problem.t_end:g}: {z:.16g}")
+    if known.t[-1] == problem.t_end:
+        for label, observable in list(observables(problem).items())[:1]:
+            value = float(observable(known.high[-1:])[0])
+            said.insert(0, f"Reference value of the {label} at t = {problem.t_end:g}: {value:.16g}")
     return Items(said)

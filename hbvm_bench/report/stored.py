@@ -33,9 +33,6 @@ def contents(document: Document, runs: Sequence[StoredRun], stores: Sequence[Sto
             kept.save(record, {name: arrays[name] for name in named if name in arrays}, compress=False)
         for record in store.computed().values():
             kept.save(record, store.series(record.id), compress=False)
-    for store in stores:
-        for name, content in store.studies().items():
-            kept.keep_study(name, content)
     for section, picture in _drawn(document):
         kept.keep_figure(section.key, encoded(picture))
     return kept

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from hbvm_bench.campaign.file import TimingPlan
 from hbvm_bench.measure.measured import POSITION
 from hbvm_bench.measure.metrics import GUARD_TOLERANCE
-from hbvm_bench.store.records import Record
+from hbvm_bench.store.records import Record, Value
 from hbvm_bench.summaries.outcomes import disturbed
 from hbvm_bench.summaries.points import accurate, is_hbvm_or_gauss, number, short_name
 from hbvm_bench.summaries.rows import (
@@ -102,6 +102,11 @@ def timing(plan: TimingPlan) -> str:
         visits = "Every case is visited once, in a fresh process."
     if plan.interleaved and plan.clock != "wall":
         visits += f" The seconds are CPU time of this {plan.clock}: waiting does not count."
+    if plan.front:
+        visits += (
+            " A setting that in the first compilation takes more than twice the time of another one of its "
+            "method that is as accurate is not timed again."
+        )
     sample = f"A sample lasts at least {seconds(plan.shortest)}."
     if plan.shortest < SHORTEST_RUN:
         sample = "A sample is one integration."
@@ -141,9 +146,10 @@ def summary(records: Sequence[Record]) -> list[str]:
             f"below {APART:g}."
         )
         sentences.append(_best("Smallest position error up to there", part, "position_max"))
-    elif groups["uncompared"]:
+    elif alone := groups["uncompared"]:
+        why = alone[0].result.metrics.get(RANKED_BY, Value()).why or "no stored reference for this problem"
         sentences.append(
-            "This problem has no stored reference: positions are not measured, and nothing is ranked. "
+            f"{why[0].upper()}{why[1:]}: positions are not compared, and nothing is ranked. "
             "`reference = true` in the campaign file, or `--reference`, computes one before the run."
         )
     sentences += disturbed(records)
@@ -161,11 +167,11 @@ def shortcomings(records: Sequence[Record]) -> list[str]:
         ours = is_hbvm_or_gauss(record) and reached(record)
         if not ours or position is None or energy is None or position < 1e-2:
             continue
-        z, angular = number(record, "z_error"), number(record, "angular_momentum_max")
+        observable, angular = number(record, "observable_error"), number(record, "angular_momentum_max")
         shown.append(
             f"Here {record.case.method} has an energy error of {energy:.1e} "
             f"and a position error of {position:.2g} at the end"
-            + ("" if z is None else f", an error of z of {z:.2g}")
+            + ("" if observable is None else f", an error of the observable of {observable:.2g}")
             + ("" if angular is None else f", an error of the angular momentum of {angular:.1e}")
             + "; the paths below show the orbits."
         )

@@ -81,6 +81,8 @@ def _timing(plan: TimingPlan) -> None:
             f"shortest={plan.shortest!r} of timing is too short for a clock to be trusted; give at least "
             f"{SHORTEST}: shorter runs are repeated."
         )
+    if plan.front and plan.compilations < 2:
+        raise InputError("front = true of timing needs compilations = 2 or more, the first of which tells.")
     for name in ("samples",) if plan.interleaved else ("order", "clock"):
         if (given := getattr(plan, name)) != getattr(TimingPlan(), name):
             other = str(not plan.interleaved).lower()
@@ -168,8 +170,6 @@ def _metrics(keys: Iterable[str], cases: Sequence[Resolved]) -> None:
             raise InputError(
                 f"the metric {metric.key!r} cannot be asked for: no side of it is the better one."
             )
-        if metric.problem and all(case.problem.name != metric.problem for case in cases):
-            raise InputError(f"the metric {metric.key!r} is of {metric.problem} alone; ask for another one.")
 
 
 def _goal(goal: Goal, campaign: Campaign, cases: Sequence[Resolved]) -> None:

@@ -15,6 +15,7 @@ from hbvm_bench.campaign.file import Limits, TimingPlan
 from hbvm_bench.campaign.identity import Resolved
 from hbvm_bench.measure import machine, reading
 from hbvm_bench.measure.timing import shared
+from hbvm_bench.run import front
 from hbvm_bench.run.task import decoded, empty_caches, start
 from hbvm_bench.run.worker import REPLY, Request
 from hbvm_bench.store.records import Record, Timing
@@ -141,13 +142,23 @@ def _together(
         wall_seconds=limits.wall_seconds * len(on),
         compile_seconds=limits.compile_seconds * len(on),
     )
-    parts = [
-        _asked(on, plan, together, core, rounds=numbers, compilation=place)
-        for place, numbers in enumerate(shared(plan.rounds, plan.compilations))
-        if on
-    ]
-    pairs = zip((item.id for item in on), map(_joined, zip(*parts, strict=True)), strict=True) if on else ()
-    timings = {item.id: Timing(why=OFF) for item in group} | dict(pairs)
+    taken: dict[str, list[Timing]] = {item.id: [] for item in on}
+    going = on
+    for place, numbers in enumerate(shared(plan.rounds, plan.compilations)):
+        parts = _asked(going, plan, together, core, rounds=numbers, compilation=place) if going else []
+        for item, part in zip(going, parts, strict=True):
+            taken[item.id].append(part)
+        if plan.front and not place:
+            there = [record for record in records if not record.result.violation]
+            left = zip(on, front.behind(going, there, parts), strict=True)
+            going = []
+            for item, is_behind in left:
+                if is_behind:
+                    taken[item.id].append(Timing(why=front.WHY))
+                else:
+                    going.append(item)
+    timings = {item.id: Timing(why=OFF) for item in group}
+    timings |= {key: _joined(parts) for key, parts in taken.items()}
     return [replace(item, plan=plan, machine=here, process=process) for item in timings.values()]
 
 

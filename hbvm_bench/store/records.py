@@ -17,6 +17,7 @@ from hbvm_bench.campaign.file import Case
 from problems.errors import printable
 
 T = TypeVar("T")
+OTHER_WORK = 0.1  # of a core: with more beside the times these are doubtful, and no speed is judged
 COMPILING = "compiling"  # the status of a timeout before a case began
 DIED = "died"  # the status of a case whose process ended without an answer: it says nothing final of the case
 
@@ -140,6 +141,15 @@ class Load(msgspec.Struct, frozen=True, kw_only=True):
 
     others: float
     steal: float = msgspec.field(name="stolen")
+
+    @property
+    def most(self) -> float:
+        """The larger of the two."""
+        return max(self.others, self.steal)
+
+    def verdict(self) -> str:
+        """Return why times beside this load are not judged; ``""`` where they are."""
+        return f"other work took {self.most:.0%} of a core" if self.most > OTHER_WORK else ""
 
 
 class Timing(msgspec.Struct, frozen=True, kw_only=True):

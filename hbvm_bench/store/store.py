@@ -6,7 +6,6 @@
     results    one row per case: its `Record` as JSON, and the columns that one looks for
     arrays     those of a case by name, compressed ``.npy``; see `hbvm_bench.measure.raw`
     problems   what is known of a problem that does not come with the package, or its reference
-    studies    what a study computed beside its cases
     figures    of a report: those whose arrays it does not keep
 
 The runner alone writes. A row and its arrays are one transaction, so that the end of a process at any moment
@@ -57,7 +56,6 @@ CREATE TABLE arrays (
     PRIMARY KEY (run, id, name));
 CREATE TABLE problems (run INTEGER NOT NULL, problem TEXT NOT NULL, known TEXT NOT NULL,
     PRIMARY KEY (run, problem));
-CREATE TABLE studies (name TEXT PRIMARY KEY, content TEXT NOT NULL);
 CREATE TABLE figures (place TEXT NOT NULL, number INTEGER NOT NULL, picture TEXT NOT NULL,
     PRIMARY KEY (place, number));
 """
@@ -244,17 +242,6 @@ class Store:
         for (text,) in self._rows("SELECT known FROM problems WHERE run=?"):
             with suppress(ValueError, LookupError, TypeError):  # damaged: whoever needs it says so
                 own.add_known(decoded(text.encode(), own.Beside))
-
-    def keep_study(self, name: str, content: object) -> None:
-        """Store what a study computed beside its cases: JSON."""
-        with self._writing() as database:
-            row = name, msgspec.json.encode(content).decode()
-            database.execute("INSERT OR REPLACE INTO studies VALUES (?,?)", row)
-
-    def studies(self) -> dict[str, Any]:
-        """Return what studies computed beside the cases, by name."""
-        rows = self._all("SELECT name, content FROM studies ORDER BY name")
-        return {name: decoded(text.encode(), object) for name, text in rows}
 
     def keep_figure(self, place: str, picture: str) -> None:
         """Store a figure of a part of a report's page."""

@@ -14,7 +14,6 @@ from hbvm_bench.measure.measured import POSITION
 from hbvm_bench.measure.timing import Spread
 from hbvm_bench.report.document import Block, Note, Section, attempt
 from hbvm_bench.report.figures.canvas import Picture, new, picture, styled
-from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
 from hbvm_bench.report.figures.style import INK, MUTED, PAPER, base
 from hbvm_bench.report.page import Results, block
 from hbvm_bench.store.records import Record
@@ -182,7 +181,7 @@ def ratios_drawn(results: Mapping[str, Sequence[StoredRun]]) -> Picture:
     figure = new(8.6, 0.9 + 0.36 * len(problems))
     axes = figure.add_axes((0.36, 0.6 / figure.get_figheight(), 0.6, 1 - 0.95 / figure.get_figheight()))
     axes.set_xscale("log")
-    traces, said = [], []
+    said, handles = [], []
     for number, (kind, members) in enumerate(pairs_of.items(), 1):
         shade, marker = base("HBVM")[0], "os^D"[(number - 1) % 4]
         known = [pair for pair in members if pair.ratio is not None]
@@ -190,15 +189,15 @@ def ratios_drawn(results: Mapping[str, Sequence[StoredRun]]) -> Picture:
         y = np.array([float(height[pair.problem]) for pair in known])
         for pair, at, up in zip(known, x, y, strict=True):
             face = PAPER if pair.words == "less accurate" else shade
-            axes.plot([at], [up], marker, color=shade, markerfacecolor=face, markersize=6)
+            look = {"color": shade, "markerfacecolor": face, "markersize": 6}
+            axes.plot([at], [up], marker, label=f"{pair.problem}, {kind}", **look)
             said.append(f"{pair.problem}, {kind}: {at:.2f}")
-        axes.plot([], [], marker, color=shade, label=kind, linestyle="")
-        traces.append(Trace(number, kind, x, y))
+        handles += axes.plot([], [], marker, color=shade, label=kind, linestyle="")
         for pair in members:
             goal = pair.verdict.goal.ratio if pair.verdict is not None else None
             if goal is not None:
                 axes.plot([goal], [height[pair.problem]], "|", color=INK, markersize=13)
-    axes.plot([], [], "|", color=INK, label="goal", linestyle="")
+    handles += axes.plot([], [], "|", color=INK, label="goal", linestyle="")
     axes.axvline(1.0, color=MUTED, linewidth=0.9)
     ticks = [value for value in (0.5, 1.0, 2.0, 4.0, 8.0, 16.0) if value <= 2 * axes.get_xlim()[1]]
     axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
@@ -206,9 +205,8 @@ def ratios_drawn(results: Mapping[str, Sequence[StoredRun]]) -> Picture:
     named = ["\n".join(textwrap.wrap(problem, 44, break_on_hyphens=False)) for problem in problems]
     axes.set_yticks([height[problem] for problem in problems], named)
     axes.set_ylim(0.4, len(problems) + 0.6)
-    horizontal = Axis("time of the Taylor method relative to HBVM()", log=True)
-    axes.set_xlabel(horizontal.label)
-    figure.legend(loc="upper right", ncols=len(pairs_of) + 1, fontsize=7)
+    axes.set_xlabel("time of the Taylor method relative to HBVM()")
+    figure.legend(handles=handles, loc="upper right", ncols=len(pairs_of) + 1, fontsize=7)
     return picture(
         figure,
         "ratios",
@@ -217,7 +215,6 @@ def ratios_drawn(results: Mapping[str, Sequence[StoredRun]]) -> Picture:
         "less accurate in energy and position, an open one runs in which it is in one of them. A vertical "
         "bar is the goal that was declared before.",
         "; ".join(said) + ".",
-        Plot([Panel("", horizontal, Axis("problem, from below"), traces)], "points"),
     )
 
 

@@ -14,7 +14,6 @@ from hbvm_bench.measure import drift, machine
 from hbvm_bench.measure.starts import PERTURBATION
 from hbvm_bench.report.document import Note, Section
 from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture, styled
-from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
 from hbvm_bench.report.figures.style import MUTED, Look
 from hbvm_bench.report.page import Results, block
 from hbvm_bench.report.provenance import again
@@ -23,7 +22,7 @@ from hbvm_bench.store.stored_run import StoredRun
 from hbvm_bench.summaries import outcomes, standings
 from hbvm_bench.summaries.goals import Verdict, verdicts
 from hbvm_bench.summaries.goals import table as goals_table
-from hbvm_bench.summaries.growth import clear, power_of, text
+from hbvm_bench.summaries.growth import clear, power_of
 from hbvm_bench.summaries.points import number
 from hbvm_bench.summaries.rows import seconds
 from hbvm_bench.summaries.table import NONE, Table
@@ -168,8 +167,6 @@ def goals(result: Endurance) -> list[Verdict]:
     return verdicts(result.run.index.campaign, result.run.records)
 
 
-LAW_POINTS = 40
-FALLS_ON = 30  # a growth is drawn over the last part of the interval, from this fraction of it
 METHOD = """
 The methods run one after the other from each initial condition, in one process on one core. The energy is
 evaluated in double-double arithmetic at whole years, spaced evenly in log time, at ends of steps or in a way
@@ -309,9 +306,9 @@ def over_time(result: Endurance, look: Mapping[str, Look]) -> Picture | None:
     figure.subplots_adjust(left=0.08, right=0.94, top=0.94, bottom=0.1)
     log_axis(axes, "x", math.floor(math.log10(t[0])), math.ceil(math.log10(t[-1])))
     log_axis(axes, "y", low, max(high, low + 1))
-    line_of, traces = {line.method: line for line in lines(result)}, []
+    line_of = {line.method: line for line in lines(result)}
     for (method, errors), rms in zip(shown, values, strict=True):
-        number, colour, dash = look[method].number, look[method].light, look[method].dash
+        colour, dash = look[method].light, look[method].dash
         for row in np.abs(errors):
             axes.plot(t, np.where(row > 0.0, row, np.nan), color=colour, linewidth=0.4, alpha=0.18)
         axes.plot(
@@ -325,11 +322,6 @@ def over_time(result: Endurance, look: Mapping[str, Look]) -> Picture | None:
             linewidth=1.6,
             label=method,
         )
-        traces.append(Trace(number, method, t, np.where(rms > 0.0, rms, np.nan)))
-        growth = line_of[method].drift
-        if growth is not None and growth.kind is not None:
-            at = np.geomspace(t[-1] / FALLS_ON, t[-1], LAW_POINTS)
-            traces.append(Trace(number, method, at, drift.curve(growth, at), "fit", text(growth)))
     guide = t[t >= t[-1] / 1e3]
     axes.plot(guide, 10.0 ** (low + 0.4) * np.sqrt(guide / guide[0]), color=MUTED, linewidth=0.8)
     axes.annotate(" √t", (guide[-1], 10.0 ** (low + 0.4) * math.sqrt(guide[-1] / guide[0])), color=MUTED)
@@ -340,7 +332,6 @@ def over_time(result: Endurance, look: Mapping[str, Look]) -> Picture | None:
         f"{line.method}: {', '.join(f'{value:.1e} at {year:g} years' for year, value in line.rms.items())}"
         for line in line_of.values()
     )
-    vertical = Axis("rms of the relative energy error", log=True)
     return picture(
         figure,
         "endure",
@@ -348,5 +339,4 @@ def over_time(result: Endurance, look: Mapping[str, Look]) -> Picture | None:
         "Thick: root mean square over the initial conditions; thin: each of them. The grey line grows like "
         "the square root of time, as unbiased rounding errors do.",
         said,
-        Plot([Panel(title, Axis("years", log=True), vertical, traces)]),
     )

@@ -10,9 +10,8 @@ import msgspec
 from hbvm_bench.campaign.file import Campaign, Goal, ProblemEntry, name_of
 from hbvm_bench.measure.metrics import METRICS, find
 from hbvm_bench.measure.timing import Spread
-from hbvm_bench.store.records import Record
+from hbvm_bench.store.records import Load, Record
 from hbvm_bench.summaries import standings
-from hbvm_bench.summaries.outcomes import OTHER_WORK
 from hbvm_bench.summaries.points import number
 from hbvm_bench.summaries.rows import format_metric
 from hbvm_bench.summaries.standings import SettingComparison
@@ -20,7 +19,7 @@ from hbvm_bench.summaries.table import NONE, Table
 
 TIMES = ("warm_seconds", "throughput")
 
-PLACE = ("position", "phase", "z_error")
+PLACE = ("position", "phase", "observable_error")
 """With what the metrics begin that say where a run is, not only on which level of energy."""
 
 
@@ -112,8 +111,8 @@ def other_work(records: Sequence[Record | None]) -> str:
         return ""
     loads = [item.load for item in timings if item.load is not None]
     shares = [1.0 - median(round_.share for round_ in item.rounds) for item in timings if item.rounds]
-    most = max([0.0, *shares, *(max(load.others, load.steal) for load in loads)])
-    return f"other work took {most:.0%} of a core during the timing" if most > OTHER_WORK else ""
+    most = Load(others=max([0.0, *shares, *(load.most for load in loads)]), steal=0.0)
+    return f"{most.verdict()} during the timing" if most.verdict() else ""
 
 
 def _judged(goal: Goal, entry: ProblemEntry, records: Sequence[Record]) -> Verdict:

@@ -12,7 +12,6 @@ from hbvm_bench.summaries.table import Table
 
 UNDISTURBED = 0.9  # of a core, in the timing pass
 STEADY = 1.5  # quartiles of the calibration around a timing sample
-OTHER_WORK = 0.1  # of a core: with more beside the times these are doubtful, and no speed is judged
 
 State = Literal["on", "apart", "uncompared", "off", "ended", "refused", "absent"]
 
@@ -149,7 +148,7 @@ def beside(records: Sequence[Record]) -> list[str]:
 def other_work(loads: Sequence[Load]) -> str:
     """Say what else ran while times were taken, from at least one look at it."""
     others, steal = (_shares([getattr(load, name) for load in loads]) for name in ("others", "steal"))
-    doubt = "; the times are doubtful" if any(map(_doubtful, loads)) else ""
+    doubt = "; the times are doubtful" if any(load.verdict() for load in loads) else ""
     return (
         f"While times were taken, other processes used {others} of a core, and the steal time was "
         f"{steal} of one{doubt}."
@@ -192,11 +191,7 @@ def by_compilation(record: Record) -> list[float]:
 
 def busy(records: Sequence[Record]) -> bool:
     """Whether the machine had so much other work that interleaved times are doubtful."""
-    return any(map(_doubtful, _loads(records)))
-
-
-def _doubtful(load: Load) -> bool:
-    return max(load.others, load.steal) > OTHER_WORK
+    return any(load.verdict() for load in _loads(records))
 
 
 def _loads(records: Sequence[Record]) -> list[Load]:

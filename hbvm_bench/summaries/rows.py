@@ -14,8 +14,9 @@ from hbvm_bench.summaries.table import NONE
 
 # In this order a reader needs them; position and its error stand beside the energy, always.
 HEADLINE = (
-    *("energy_max", "angular_momentum_max", "guard_max", "position_end", "phase_end", "z_end", "z_error"),
-    *("steps", "evaluations", "warm_seconds", "throughput", "compile_seconds", "megno", "exponent"),
+    *("energy_max", "angular_momentum_max", "guard_max", "position_end", "phase_end", "observable_end"),
+    *("observable_error", "steps", "evaluations", "warm_seconds", "throughput", "compile_seconds"),
+    *("megno", "exponent"),
 )
 RANKED_BY = "position_end"
 APART = 0.1  # position error at the end; the trajectory is another one there

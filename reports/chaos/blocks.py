@@ -12,7 +12,7 @@ from hbvm_bench.report.document import Claim, Items, Maker, Note, Section
 from hbvm_bench.report.figures.drawn import number
 from hbvm_bench.report.page import Results
 from hbvm_bench.report.parts import Part, PartResults, claims_of, sections_of, tasks_of
-from hbvm_bench.summaries.outcomes import OTHER_WORK
+from hbvm_bench.store.records import OTHER_WORK, Load
 from hbvm_bench.summaries.rows import seconds as in_words
 from hbvm_bench.summaries.table import NONE, Table
 from integrators.dynamics.lyapunov import INTERVALS
@@ -298,12 +298,12 @@ HOW = (
 
 
 def _spent(seconds: Sequence[float], others: float, steal: float) -> str:
-    judged = max(others, steal) <= OTHER_WORK
-    return in_words(median(seconds)) + ("" if judged else " (not judged)")
+    busy = Load(others=others, steal=steal).verdict()
+    return in_words(median(seconds)) + " (not judged)" * bool(busy)
 
 
 def _busy(shares: Sequence[float]) -> str:
-    if max(shares) > OTHER_WORK:
+    if Load(others=max(shares), steal=0.0).verdict():
         return (
             f" Not judged: other work took more than {OTHER_WORK:.0%} of a core during the timing, at most "
             f"{max(shares):.0%}."

@@ -13,10 +13,9 @@ from hbvm_bench.report import provenance
 from hbvm_bench.report.document import Items, Maker, Note, Section, attempt
 from hbvm_bench.report.page import Results
 from hbvm_bench.report.parts import Part, PartResults, sections_of, tasks_of
-from hbvm_bench.store.records import Record
+from hbvm_bench.store.records import OTHER_WORK, Record
 from hbvm_bench.summaries import compilations, outcomes, standings
 from hbvm_bench.summaries.goals import other_work, ratio_text
-from hbvm_bench.summaries.outcomes import OTHER_WORK
 from hbvm_bench.summaries.points import family_of
 from hbvm_bench.summaries.rows import format_metric, grouped_by, status_of
 from hbvm_bench.summaries.table import NONE, Table
@@ -277,8 +276,7 @@ def in_c(found: BesideC) -> Table | Note:
     """Return times, iterations and errors beside the same algorithm in C, or why there are none."""
     if found.times is None:
         return Note(f"Not run: {found.compiler}.")
-    most = max(found.times.others, found.times.stolen)
-    verdict = f"not judged: other work took {most:.0%} of a core" if most > OTHER_WORK else "judged"
+    verdict = found.times.verdict
     ours = found.times.seconds[OURS]
     rows = []
     for name in (OURS, IN_C):
@@ -312,15 +310,20 @@ def in_c(found: BesideC) -> Table | Note:
 
 
 def _timed(title: str, methods: Sequence[str], times: Times, scale: float, unit: str, note: str) -> Table:
-    most = max(times.others, times.stolen)
-    verdict = f"not judged: other work took {most:.0%} of a core" if most > OTHER_WORK else "judged"
     rows = []
     for method in methods:
         samples = [scale * seconds for seconds in times.seconds[method]]
         spread = Spread.from_samples(samples)
         quartiles = NONE if spread.low is None else f"{spread.low:.3g} to {spread.high:.3g}"
         rows.append(
-            (method, f"{spread.median:.3g}", quartiles, f"{min(samples):.3g}", f"{len(samples)}", verdict)
+            (
+                method,
+                f"{spread.median:.3g}",
+                quartiles,
+                f"{min(samples):.3g}",
+                f"{len(samples)}",
+                times.verdict,
+            )
         )
     return Table(
         title,

@@ -17,6 +17,7 @@ from hbvm_bench.measure import machine
 from hbvm_bench.measure.timing import busy, interleaved, load_between, no_collection
 from hbvm_bench.run.task import empty_caches
 from hbvm_bench.run.worker import ENVIRONMENT
+from hbvm_bench.store.records import Load
 from integrators import integrate, start
 from integrators.protocol import Status
 from integrators.solution import Solution
@@ -59,6 +60,12 @@ class Times:
     seconds: dict[str, list[float]]
     others: float
     stolen: float
+
+    @property
+    def verdict(self) -> str:
+        """Whether the times are judged, and why not."""
+        why = Load(others=self.others, steal=self.stolen).verdict()
+        return f"not judged: {why}" if why else "judged"
 
 
 def iterations(n: int, t_end: float) -> dict[str, Iterations]:

@@ -15,7 +15,6 @@ from hbvm_bench.measure.computation import Task
 from hbvm_bench.measure.timing import Spread
 from hbvm_bench.report.document import Maker
 from hbvm_bench.report.parts import Part, PartResults
-from hbvm_bench.summaries.outcomes import OTHER_WORK
 from hbvm_bench.summaries.table import NONE, Table
 from integrators import HBVM, integrate
 from integrators.protocol import Array
@@ -103,8 +102,6 @@ def part(rounds: int) -> Part:
 
 def table(taken: Times) -> Table:
     """Return the time of a trajectory alone, and of one with vectors relative to it, for both libraries."""
-    most = max(taken.others, taken.stolen)
-    verdict = f"not judged: other work took {most:.0%} of a core" if most > OTHER_WORK else "judged"
     rows = []
     for key, name in LIBRARIES.items():
         alone = taken.seconds[f"{key} 0"]
@@ -115,7 +112,7 @@ def table(taken: Times) -> Table:
             for seconds in (taken.seconds[f"{key} {n}"] for n in COUNTS[1:])
         ]
         median = Spread.from_samples([1e6 * seconds for seconds in alone]).median
-        rows.append((name, f"{median:.3g}", *map(_text, ratios), f"{len(alone)}", verdict))
+        rows.append((name, f"{median:.3g}", *map(_text, ratios), f"{len(alone)}", taken.verdict))
     return Table(
         "Time with tangent vectors, relative to the trajectory alone",
         ("method", "alone (µs)", *(f"{n} vector{'s' * (n > 1)}" for n in COUNTS[1:]), "samples", "verdict"),

@@ -187,7 +187,6 @@ METHODS\nmethods = [{use = ["HBVM()", "IAS15()"], quick = [2]}] => there is no s
 METHODS\nmethods = [{use = ["HBVM()", "IAS15()"], quick = [-1]}] => there is no setting -1; there are 2, count
 name = "x"\nproblems = ["kepler()", "morse()"]\nmethods = [{use = "HBVM()", only = ["kepler"]}] => no method
 PROBLEMS\nproblems = [{use = "kepler()", within = {positon_end = 1}}] => unknown metric 'positon_end'; did you
-PROBLEMS\nproblems = [{use = "kepler()", within = {z_error = 1}}] => the metric 'z_error' is of sitnikov alone
 PROBLEMS\nproblems = [{use = "kepler()", within = {distance_max = 1}}] => the metric 'distance_max' cannot be
 BOTH\n[[goals]]\nat = 1\nwithin = {positon_end = 1}           => unknown metric 'positon_end'; did you mean
 BOTH\n[[goals]]\nat = 1\nmetric = "warm_second"               => unknown metric 'warm_second'; did you mean

@@ -246,9 +246,11 @@ def toml(campaign):
     return f"name = {campaign.name!r}\nproblems = {campaign.problems!r}\n{entries}[timing]\nrounds = 1\n"
 
 
-def results_of(*runs, beside=None):
+def results_of(*runs, computed=None):
     """Return what a page is made of, from runs that nobody ran."""
-    return Results(list(runs), [record for run in runs for record in run.records], {}, beside=beside or {})
+    return Results(
+        list(runs), [record for run in runs for record in run.records], {}, computed=computed or {}
+    )
 
 
 def archived(directory, *runs):

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 from numpy.typing import NDArray
 
-from hbvm_bench.report.figures.plots import Plot, numbers
+from hbvm_bench.report.figures.plots import numbers
 from hbvm_bench.report.figures.style import GRID, INK, MUTED, NEUTRALS, PAPER
 from hbvm_bench.summaries.table import Table
 
@@ -64,7 +64,6 @@ class Picture:
     summary: str  # what it shows, for those who do not see it
     svg: str
     numbers: Table | None = None  # what it shows
-    motion: dict[str, Any] | None = None  # what the page's moving view of it is made of
     values: bool = False  # whether its colours mean values, so that no theme may brighten them
     in_text: bool = False  # whether the markdown shows it, however many figures come before it
 
@@ -95,7 +94,6 @@ def picture(
     title: str,
     caption: str,
     summary: str,
-    plot: Plot | None = None,
     *,
     values: bool = False,
 ) -> Picture:
@@ -107,7 +105,7 @@ def picture(
     text = re.sub(r"\s*<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.DOTALL)
     # Verdana is as wide as DejaVu Sans, so that labels keep their places where that is missing
     text = text.replace(f"'{FONT}'", f"'{FONT}', Verdana, sans-serif")
-    shown = None if plot is None else numbers(plot)
+    shown = numbers(figure)
     return Picture(key, title, caption, summary, compact(with_small_images(text)), shown, values=values)
 
 

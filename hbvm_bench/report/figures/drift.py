@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from hbvm_bench.measure import drift
 from hbvm_bench.report.figures.canvas import Picture, log_axis, picture, power_range
-from hbvm_bench.report.figures.over_time import Drawn, family_panels, panel_legend, trace
-from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
+from hbvm_bench.report.figures.over_time import Drawn, family_panels, panel_legend
+from hbvm_bench.report.figures.plots import named
 from hbvm_bench.store.records import ErrorGrowth
 from hbvm_bench.summaries.growth import FEWEST_STARTS, NOT_CLEAR, clear, text
 from hbvm_bench.summaries.rows import reached
@@ -37,7 +37,6 @@ def drift_figure(cases: Sequence[Drawn]) -> Picture | None:
     figure, grid = family_panels(shown, label, notes)
     low, high = power_range([y for _, y in curves.values()], *POWERS)
     times = np.concatenate([t for t, _ in curves.values()])
-    traces: list[Trace] = []
     for axes, members in grid:
         log_axis(axes, "y", low, high)
         left, right = power_range([times], -6, 12)
@@ -47,9 +46,9 @@ def drift_figure(cases: Sequence[Drawn]) -> Picture | None:
             key, look = case.record.id, case.look
             t, error = curves[key]
             at, fitted = _fitted(growths[key], t)
-            axes.plot(t, error, look.marker, color=look.light, markersize=2.4, linestyle="")
+            name = named(look.number, case.record.case.method)
+            axes.plot(t, error, look.marker, color=look.light, markersize=2.4, linestyle="", label=name)
             axes.plot(at, fitted, color=look.light, linewidth=1.1, dashes=look.dash)
-            traces += [trace(case, t, error), trace(case, at, fitted, role="fit", note=said.get(key, ""))]
         panel_legend(axes, members, markers=True, notes=notes)
     starts = max(growth.starts for growth in growths.values())
     over = (
@@ -74,7 +73,6 @@ def drift_figure(cases: Sequence[Drawn]) -> Picture | None:
         "Growth of each case. "
         + "; ".join(f"{c.record.case.method}: {said.get(c.record.id, NOT_CLEAR)}" for c in shown)
         + ".",
-        Plot([Panel("", Axis("time", log=True), Axis(label, log=True), traces)]),
     )
 
 

@@ -4,7 +4,6 @@ import math
 import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture
-from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
+from hbvm_bench.report.figures.plots import named
 from hbvm_bench.report.figures.style import INK, MUTED, Look, options, panels
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries.points import family_of, number
@@ -23,7 +22,6 @@ from hbvm_bench.summaries.rows import group_of
 Array = NDArray[np.float64]
 
 BINS = 60  # an error series is drawn as its largest value in each of so many spans
-FINE_BINS = 120  # and in so many in the page's interactive figures
 COLUMNS = 4
 # Inches: the panels of all figures over time have one size and stand under each other.
 WIDTH, LEFT, RIGHT, GAP = 12.4, 0.9, 0.18, 0.36
@@ -91,24 +89,14 @@ def over_time(cases: Sequence[Drawn], spec: OverTime) -> Picture | None:
         for case in members:
             _draw_error(axes, case, spec)
         panel_legend(axes, members, markers=not spec.joined)
-    curves, largest = [], []
+    largest = []
     for case in shown:
-        t, values = _finite(case, spec)
+        _, values = _finite(case, spec)
         largest.append(
             f"{case.record.case.method}: {f'{values.max():.1e}' if values.size else 'none finite'}"
         )
-        if spec.joined:
-            t, values = envelope(t, values, FINE_BINS)
-        curves.append(trace(case, t, np.where(values > 0.0, values, 0.0 if spec.zero else np.nan)))
     summary = f"{spec.title}, largest values. {'; '.join(largest)}."
-    y = Axis(spec.label, log=True)
-    plot = Plot([Panel("", Axis("time"), y, curves)])
-    return picture(figure, spec.key, spec.title, spec.caption, summary, plot)
-
-
-def trace(case: Drawn, x: Array, y: Array, **more: Any) -> Trace:
-    """Return a curve of a case for the page."""
-    return Trace(case.look.number, case.record.case.method, x, y, **more)
+    return picture(figure, spec.key, spec.title, spec.caption, summary)
 
 
 def _finite(case: Drawn, spec: OverTime) -> tuple[Array, Array]:
@@ -217,6 +205,7 @@ def _draw_error(axes: Axes, case: Drawn, spec: OverTime) -> None:
     bottom = 10.0**spec.low
     clipped = np.clip(values, bottom * (10.0 if spec.zero else 1.0), 10.0**spec.high)
     drawn = np.where(values == 0, bottom, clipped) if spec.zero else clipped
-    (line,) = axes.plot(t, drawn, color=case.look.light, dashes=case.look.dash, clip_on=False)
+    name = named(case.look.number, case.record.case.method)
+    (line,) = axes.plot(t, drawn, color=case.look.light, dashes=case.look.dash, clip_on=False, label=name)
     if not spec.joined:
         line.set(linewidth=0.7, marker=case.look.marker, markersize=2.6, markevery=max(1, t.size // 10))

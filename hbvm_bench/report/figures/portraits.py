@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hbvm_bench.report.figures.canvas import Picture, new, picture
-from hbvm_bench.report.figures.over_time import WIDTH, Drawn, cut, trace
-from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
+from hbvm_bench.report.figures.over_time import WIDTH, Drawn, cut
+from hbvm_bench.report.figures.plots import named
 from hbvm_bench.report.figures.style import INK, MUTED, options
 from problems.problem import Problem
 
@@ -16,7 +16,6 @@ Array = NDArray[np.float64]
 
 COLUMNS = 6
 POINTS_DRAWN = 3000  # points of one case that are drawn
-PAGE_POINTS = 700  # and that the page carries
 FEWEST_CROSSINGS = 20
 FARTHEST = 3.0  # times the usual width: a wider cloud is cut at the edge of its panel
 COARSEST = 0.5  # of the largest |q1| between two samples: beyond, a crossing is a guess
@@ -88,12 +87,13 @@ def _grid(
     )
     grid = figure.subplots(rows, COLUMNS, squeeze=False, sharex=True, sharey=True).ravel().tolist()
     reach = [_reach([x for _, x, _ in clouds]), _reach([y for _, _, y in clouds])]
-    traces: list[Trace] = []
     for axes in grid[len(clouds) :]:
         axes.set_axis_off()
     for axes, (case, x, y) in zip(grid, clouds, strict=False):
         every = max(1, -(-x.size // POINTS_DRAWN))
-        axes.plot(x[::every], y[::every], ".", color=case.look.light, markersize=1.1, rasterized=True)
+        name = named(case.look.number, case.record.case.method)
+        dots, look = (x[::every], y[::every]), {"markersize": 1.1, "rasterized": True}
+        axes.plot(*dots, ".", color=case.look.light, label=name, **look)
         axes.set(xlim=reach[0], ylim=reach[1])
         axes.set_title(case.short, fontsize=8, color=INK)
         lowest = axes in grid[max(len(clouds) - COLUMNS, 0) : len(clouds)]
@@ -102,14 +102,11 @@ def _grid(
             axes.text(1.0, -0.2, labels[0], transform=axes.transAxes, fontsize=8, ha="right", va="top")
         words, below = cut(options(case.record), 33), -0.2 if lowest else -0.08
         axes.text(0.0, below, words, transform=axes.transAxes, fontsize=6, color=MUTED, va="top")
-        fewer = max(1, -(-x.size // PAGE_POINTS))
-        traces.append(trace(case, x[::fewer], y[::fewer]))
     for row in range(rows):
         grid[row * COLUMNS].set_ylabel(labels[1])
     said = "; ".join(f"{case.record.case.method}: {x.size} points" for case, x, _ in clouds)
-    plot = Plot([Panel("", Axis(labels[0]), Axis(labels[1]), traces)], "dots")
     summary = f"{title} of each case. {said}."
-    return picture(figure, key, f"{title} ({labels[0]}, {labels[1]})", caption, summary, plot)
+    return picture(figure, key, f"{title} ({labels[0]}, {labels[1]})", caption, summary)
 
 
 def _reach(values: Sequence[Array]) -> tuple[float, float]:

@@ -1,6 +1,6 @@
 """Performance profiles: on which share of the problems a family is within a factor of the best."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.ticker import PercentFormatter
@@ -8,7 +8,6 @@ from matplotlib.ticker import PercentFormatter
 from hbvm_bench.measure.metrics import find
 from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture, styled
 from hbvm_bench.report.figures.over_time import WIDTH
-from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
 from hbvm_bench.report.figures.style import DASHES, INK, base
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries.needs import ACCURACIES, profile
@@ -19,8 +18,8 @@ NEVER = 6.0  # decades: the end of the axis where a family is not within any fac
 
 
 @styled
-def profiles(records: Sequence[Record], numbers: Mapping[str, int]) -> Picture | None:
-    """Draw the profiles, ``None`` for too few problems; ``numbers`` are the looks of the families."""
+def profiles(records: Sequence[Record]) -> Picture | None:
+    """Draw the profiles, ``None`` for too few problems."""
     work = work_of(records)
     shown = [profile(records, accuracy, work) for accuracy in ACCURACIES]
     shown = [item for item in shown if item.problems >= FEWEST_PROBLEMS]
@@ -30,10 +29,8 @@ def profiles(records: Sequence[Record], numbers: Mapping[str, int]) -> Picture |
     figure = new(WIDTH, 4.2)
     figure.subplots_adjust(left=0.06, right=0.86, top=0.92, bottom=0.12, wspace=0.14)
     grid = figure.subplots(1, len(shown), squeeze=False, sharey=True)[0]
-    panels: list[Panel] = []
     handles = {}
     for axes, item in zip(grid, shown, strict=True):
-        traces = []
         worst = max((r for ratios in item.ratios.values() for r in ratios if np.isfinite(r)), default=10.0)
         end = 10.0 ** min(NEVER, max(1.0, np.ceil(np.log10(worst))))
         for index, family in enumerate(item.ratios):
@@ -46,17 +43,16 @@ def profiles(records: Sequence[Record], numbers: Mapping[str, int]) -> Picture |
             colour, _, marker = base(family)
             same = [name for name in list(item.ratios)[:index] if base(name)[0] == colour]
             every = (index % 3, max(3, x.size // 6))
-            (line,) = axes.plot(x, y, color=colour, marker=marker, markevery=every, markersize=4)
+            (line,) = axes.plot(
+                x, y, color=colour, marker=marker, markevery=every, markersize=4, label=family
+            )
             line.set(linewidth=1.6, dashes=DASHES[len(same)], clip_on=False)
             handles.setdefault(family, line)
-            traces.append(Trace(numbers.get(family, 0), family, x, y))
         log_axis(axes, "x", 0, round(np.log10(end)))
         axes.set_ylim(-0.02, 1.02)
         axes.yaxis.set_major_formatter(PercentFormatter(1.0))
         axes.set_title(item.words, color=INK, fontsize=8)
-        behind, share = Axis(f"{label}, relative to the best family", log=True), Axis("share of problems")
-        axes.set_xlabel(behind.label)
-        panels.append(Panel(item.words, behind, share, traces))
+        axes.set_xlabel(f"{label}, relative to the best family")
     figure.legend(handles.values(), handles.keys(), loc="center left", bbox_to_anchor=(0.87, 0.5))
     said = " ".join(
         f"{item.words}, {item.problems} problems: "
@@ -77,5 +73,4 @@ def profiles(records: Sequence[Record], numbers: Mapping[str, int]) -> Picture |
         "Only problems on which a family ran count for it. "
         "Dolan and Moré, Mathematical Programming 91 (2002).",
         said,
-        Plot(panels),
     )

@@ -9,8 +9,8 @@ from matplotlib.lines import Line2D
 
 from hbvm_bench.measure.metrics import METRICS
 from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture, say
-from hbvm_bench.report.figures.over_time import WIDTH, Drawn, trace
-from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
+from hbvm_bench.report.figures.over_time import WIDTH, Drawn
+from hbvm_bench.report.figures.plots import named
 from hbvm_bench.report.figures.style import MUTED
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries.points import accurate, family_of, number, pareto_front
@@ -34,7 +34,6 @@ def work_precision(cases: Sequence[Drawn]) -> Picture | None:
     figure.subplots_adjust(left=0.06, right=0.99, top=0.94, bottom=0.11, wspace=0.2)
     left, right, side = figure.subplots(1, 3, width_ratios=[1, 1, 0.95])
     times = [_number(case.record, "warm_seconds") for case in shown]
-    plotted, seconds_ = [], "seconds per integration (median)"
     for axes, key in ((left, keys[0]), (right, keys[1])):
         values = [_number(case.record, key) for case in shown]
         floor = 10.0 ** math.floor(math.log10(min(value for value in values if value > 0)))
@@ -45,13 +44,11 @@ def work_precision(cases: Sequence[Drawn]) -> Picture | None:
         spots = [(s, min(max(value, floor), top * 2)) for s, value in zip(times, values, strict=True)]
         for case, spot, value in zip(shown, spots, values, strict=True):
             marker = case.look.marker if value <= top else "^"
-            axes.plot(*spot, marker, color=case.look.light, markersize=6.5, clip_on=False)
+            look = {"color": case.look.light, "label": named(case.look.number, case.record.case.method)}
+            axes.plot(*spot, marker, markersize=6.5, clip_on=False, **look)
         _number_points(axes, [(str(case.look.number), spot) for case, spot in zip(shown, spots, strict=True)])
-        axes.set(xlabel=seconds_, title=METRICS[key].label)
-        points = zip(shown, times, values, strict=True)
-        clouds = [trace(case, np.array([seconds]), np.array([value])) for case, seconds, value in points]
-        x, y = Axis(seconds_, log=True), Axis(METRICS[key].label, log=True)
-        plotted.append(Panel(METRICS[key].label, x, y, [*clouds, *_envelopes(axes, shown, spots)]))
+        axes.set(xlabel="seconds per integration (median)", title=METRICS[key].label)
+        _envelopes(axes, shown, spots)
     side.set_axis_off()
     handles = []
     for case in sorted(shown, key=lambda case: case.look.number)[:MOST_NAMED]:
@@ -74,13 +71,11 @@ def work_precision(cases: Sequence[Drawn]) -> Picture | None:
         "settings.",
         f"{len(shown)} cases. The smallest position error, {_number(best.record, 'position_end'):.1e}, "
         f"is that of {best.record.case.method}.",
-        Plot(plotted, "points"),
     )
 
 
-def _envelopes(axes: Axes, cases: Sequence[Drawn], spots: Sequence[tuple[float, float]]) -> list[Trace]:
+def _envelopes(axes: Axes, cases: Sequence[Drawn], spots: Sequence[tuple[float, float]]) -> None:
     """Join the settings of each method that none of its others beats in both work and error."""
-    traces = []
     for name in dict.fromkeys(family_of(case.record) for case in cases):
         members = [(s, c) for s, c in zip(spots, cases, strict=True) if family_of(c.record) == name]
         best = pareto_front([spot for spot, _ in members], lambda spot: spot)
@@ -89,8 +84,6 @@ def _envelopes(axes: Axes, cases: Sequence[Drawn], spots: Sequence[tuple[float, 
         x, y = np.array(best).T
         look = members[0][1].look
         axes.plot(x, y, color=look.light, linewidth=0.8, zorder=1)
-        traces.append(Trace(look.number, f"best of {name}", x, y, "fit", "on the Pareto front"))
-    return traces
 
 
 def _number_points(axes: Axes, points: Sequence[tuple[str, tuple[float, float]]]) -> None:

@@ -268,7 +268,7 @@ def _plainly(results: PartResults) -> str:
         results.records[text].result for text in ("HBVM(k=18, s=2, h=0.5)", "HBVM(k=16, s=8, h=0.125)")
     )
     share = (ours.counters.evaluations or 0) / (paper.counters.evaluations or 1)
-    off = number(ours.metrics["z_error"].value)
+    off = number(ours.metrics["observable_error"].value)
     return (
         "What HBVM(18,2) with h = 1/2 gets right: the energy, the length of the primaries' axis and with "
         f"it their period (to {number(result.slow)}), a planetoid that stays. What it gets wrong: the "
@@ -281,7 +281,7 @@ def _plainly(results: PartResults) -> str:
     )
 
 
-METRICS = ("energy_max", "angular_momentum_max", "guard_max", "z_error", "evaluations")
+METRICS = ("energy_max", "angular_momentum_max", "guard_max", "observable_error", "evaluations")
 
 
 def _others(results: PartResults) -> Table:
@@ -292,7 +292,7 @@ def _others(results: PartResults) -> Table:
             "energy": ("energy_max", number),
             "angular momentum": ("angular_momentum_max", number),
             "off the axis": ("guard_max", number),
-            "z at 1500 off by": ("z_error", number),
+            "z at 1500 off by": ("observable_error", number),
             "evaluations": ("evaluations", "{:,.0f}".format),
         },
         "The same run with other integrators",
@@ -318,7 +318,7 @@ def _remark(numbers: Mapping[str, float]) -> str:
         return "blows up"
     if numbers.get("guard_max", 0.0) > 1e-6:
         return "leaves the axis through asymmetric rounding"
-    return "loses the planetoid" if numbers.get("z_error", 0.0) > sitnikov.LOST else ""
+    return "loses the planetoid" if numbers.get("observable_error", 0.0) > sitnikov.LOST else ""
 
 
 PART = Part("sitnikov", "Sitnikov's problem", _runs(), _claims, _blocks)

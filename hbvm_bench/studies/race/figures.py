@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture, styled
-from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
+from hbvm_bench.report.figures.plots import named
 from hbvm_bench.report.figures.style import MUTED, PAPER, Look
 from hbvm_bench.store.records import Record
 from hbvm_bench.studies.race.families import FAMILIES, FIXED, OURS, OWN, FamilyRow
@@ -34,13 +34,11 @@ def work_precision(race: Race, look: Mapping[str, Look]) -> Picture | None:
     figure = new(7.6, 5.0)  # narrow enough that its labels can be read on a phone
     left, right = figure.subplots(1, 2)
     figure.subplots_adjust(left=0.07, right=0.98, top=0.94, bottom=0.31, wspace=0.22)
-    panels = [
+    for axes, title, level, key in (
+        (left, "energy error", race.asked[0], ENERGY),
+        (right, "position error at the end", race.asked[1], POSITION),
+    ):
         _panel(axes, f"{title}, relative", level, key, rows, look)
-        for axes, title, level, key in (
-            (left, "energy error", race.asked[0], ENERGY),
-            (right, "position error at the end", race.asked[1], POSITION),
-        )
-    ]
     _legend(figure, list(dict.fromkeys(row.family for row in rows)), look)
     energy, position = map(power, race.asked)
     return picture(
@@ -52,7 +50,6 @@ def work_precision(race: Race, look: Mapping[str, Look]) -> Picture | None:
         f"where the step size is adaptive. Dashed: the required accuracy, {energy} and {position}. Settings "
         "that left the trajectory are not drawn.",
         _summary(race),
-        Plot(panels, "points"),
     )
 
 
@@ -63,8 +60,8 @@ def _panel(
     key: str,
     rows: Mapping[FamilyRow, Sequence[Record]],
     look: Mapping[str, Look],
-) -> Panel:
-    """Draw one error against time, and return the same for the page."""
+) -> None:
+    """Draw one error against time."""
     shown = [record for records in rows.values() for record in records]
     times = [_seconds(record) for record in shown]
     low, high = math.floor(math.log10(min(times))), math.ceil(math.log10(max(times)))
@@ -72,15 +69,11 @@ def _panel(
     log_axis(axes, "x", low, max(high, low + 1))
     log_axis(axes, "y", FLOOR, max(math.ceil(math.log10(worst)), round(math.log10(level)) + 1), most=9)
     axes.axhline(level, color=MUTED, linewidth=0.8, linestyle=(0, (3, 3)))
-    marks, lines = [], []
     for row, records in rows.items():
         line = pareto_front(records, lambda o: (_seconds(o), _error(o, key)))
         x, y = np.array([(_seconds(o), _height(o, key)) for o in line]).T
         colour, own = look[family_of(records[0])].light, row.steps == OWN
         axes.plot(x, y, color=colour, linewidth=1.1, linestyle=DOTTED if own else "solid")
-        if len(line) > 1:
-            number, note = look[family_of(line[0])].number, "on the Pareto front of its row"
-            lines.append(Trace(number, f"best of {row.title}", x, y, "fit", note))
         for record in records:
             mark = look[family_of(record)]
             axes.plot(
@@ -91,17 +84,9 @@ def _panel(
                 markerfacecolor=PAPER if own else mark.light,
                 markersize=5.0 if record in line else 3.6,
                 clip_on=False,
+                label=named(mark.number, record.case.method),
             )
-            spot = np.array([_seconds(record)]), np.array([_error(record, key)])
-            marks.append(Trace(mark.number, record.case.method, *spot))
     axes.set(xlabel=SECONDS, title=title)
-    asked_for = np.array([min(times), max(times)]), np.array([level, level])
-    return Panel(
-        title,
-        Axis(SECONDS, log=True),
-        Axis(title, log=True),
-        [*marks, *lines, Trace(0, "required accuracy", *asked_for, "fit")],
-    )
 
 
 def _height(record: Record, key: str) -> float:

@@ -4,21 +4,25 @@
 and prints the seconds as JSON; `probe` starts it with caches of its own.
 """
 
+import hashlib
 import os
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Sequence
+from datetime import UTC, datetime
 from pathlib import Path
 
 import msgspec
 
+from hbvm_bench.campaign.file import Case
 from hbvm_bench.run.task import empty_caches
 from hbvm_bench.run.worker import ENVIRONMENT
+from hbvm_bench.store.records import Record, Result
 from hbvm_bench.studies.race.families import OURS
 
-PROBES = "compile_times"  # what the results of a race keep beside its cases
+KEY = "compile times of "  # how the keys of these rows begin; the problem follows
 TIMES = 3
 SLOW = 5.0  # seconds; what takes longer is measured once
 LIMIT = 180.0  # seconds
@@ -83,6 +87,21 @@ def probe(name: str, problem: str, h: float, families: Sequence[str]) -> list[Pr
         for template in METHODS.get(family, ())
         for entry in _probes(name, problem, family, template.format(h=h))
     ]
+
+
+def row_of(name: str, machine: dict[str, str | int], version: str) -> Record:
+    """Return the row of the results in which the compile times of a problem lie, beside the cases."""
+    return Record(
+        id=hashlib.sha256(f"{KEY}{name}".encode()).hexdigest(),
+        case=Case(problem="", method=f"{KEY}{name}"),
+        role="ours",
+        library="hbvm-bench",
+        order=None,
+        result=Result(outcome="ok", status="finished"),
+        versions={"hbvm-bench": version},
+        machine=machine,
+        finished=datetime.now(UTC).isoformat(timespec="seconds"),
+    )
 
 
 def _probes(name: str, problem: str, family: str, method: str) -> list[Probe]:

@@ -9,11 +9,12 @@ import msgspec
 from hbvm_bench.campaign.file import Campaign, ProblemEntry, name_of
 from hbvm_bench.campaign.file import load as load_campaign
 from hbvm_bench.measure import machine
+from hbvm_bench.measure.computation import VALUE, unpacked
 from hbvm_bench.report.page import Results
 from hbvm_bench.store.records import Record
 from hbvm_bench.store.stored_run import StoredRun
 from hbvm_bench.studies.race.families import OURS, FamilyRow, row_of
-from hbvm_bench.studies.race.probe import PROBES, Probe
+from hbvm_bench.studies.race.probe import KEY, Probe, probe
 from hbvm_bench.summaries import standings
 from hbvm_bench.summaries.goals import Verdict, verdicts
 from hbvm_bench.summaries.points import number
@@ -161,7 +162,7 @@ def by_kind(results: Results) -> dict[str, list[Race]]:
 
 
 def probes(results: Results) -> list[Probe]:
-    """Return the compile times that are kept beside the cases.
+    """Return the compile times that are stored beside the cases.
 
     Raises
     ------
@@ -169,8 +170,9 @@ def probes(results: Results) -> list[Probe]:
         If they are something else.
     """
     try:
-        return msgspec.convert(results.beside.get(PROBES, []), list[Probe])
-    except msgspec.ValidationError as error:
+        stored = [arrays for key, (_, arrays) in results.computed.items() if key.startswith(KEY)]
+        return [entry for arrays in stored for entry in unpacked(arrays[VALUE], probe)]
+    except (msgspec.MsgspecError, LookupError) as error:
         raise InputError(f"the compile times of the race are damaged: {error}.") from None
 
 

@@ -16,7 +16,7 @@ def pages(directory, command):
     """Return every file of a report, its rows read, with a word for the command that it names."""
     files = {path.name: path.read_bytes() for path in directory.rglob("*") if path.is_file()}
     (stored,) = Store(directory / PACKED).runs()
-    rows = [*stored.records(), stored.studies(), stored.figures(), stored.index()]
+    rows = [*stored.records(), stored.computed(), stored.figures(), stored.index()]
     files[PACKED] = msgspec.json.encode(rows)
     assert any(command.encode() in content for content in files.values())
     return {name: content.replace(command.encode(), b"COMMAND") for name, content in files.items()}

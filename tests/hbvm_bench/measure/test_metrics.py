@@ -84,9 +84,9 @@ def test_the_reference_itself_is_right_to_round_off(sitnikov):
     assert 0 < got["position_max"].value < 4e-16
     assert got["position_end"].value < 3e-16
     assert got["guard_max"].value == 0.0
-    assert got["z_end"].value == pytest.approx(-0.21429082377414022, abs=0)
+    assert got["observable_end"].value == pytest.approx(-0.21429082377414022, abs=0)
     # the distance of a double from a number: at most half an ulp of 0.21
-    assert got["z_error"].value <= 2.0**-55
+    assert got["observable_error"].value <= 2.0**-55
     assert not any(value.excluded for value in got.values())
 
 
@@ -163,12 +163,12 @@ def test_times_come_from_the_timing_pass(sitnikov):
     assert why == "nothing is compiled at run time"
 
 
-def test_metrics_of_one_problem_are_not_asked_of_another():
+def test_a_problem_without_a_guard_an_observable_or_a_reference_says_so():
     problem = problems.load("kepler")
     t = np.array([problem.t0, problem.t_end])
     made = solution_of(problem, t, np.tile(problem.y0, (2, 1)))
     got = evaluate(of(made, None))
-    assert "z_end" not in got
+    assert got["observable_end"].why == "the problem declares no observable"
     assert got["guard_max"].why == "the problem declares no symmetry guard"
     assert got["position_end"].why == "no stored reference for this problem"
 
@@ -178,3 +178,13 @@ def solution_of(problem, t, y):
         t=t, y=y, status=Status.FINISHED, reason="", t_stop=t[-1], stats=Stats(),
         compile_seconds=0.0, from_cache=None, problem=problem, method=Gauss(s=2, h=0.5),
     )  # fmt: skip
+
+
+def test_nothing_is_ranked_by_a_reference_that_has_the_start_alone():
+    """Kepler's reference and the samples of a shorter interval have the start alone in common."""
+    problem = problems.load("kepler", t_end=100.0)
+    t = np.linspace(0.0, 100.0, 1001)
+    got = evaluate(of(solution_of(problem, t, np.tile(problem.y0, (t.size, 1))), solutions.find(problem)))
+    for key in ("position_end", "position_max", "position_mean", "phase_end", "phase_max"):
+        assert got[key].value is None
+        assert got[key].why == "the stored reference has none of the run's times after the start"

@@ -28,7 +28,7 @@ def test_the_error_is_relative_to_the_largest_distance(key):
     t = reference.t
     _, error, _ = measured._position_error(problem, t, y, reference)
     size = measured.largest_distance(problem, measured.positions(problem, reference.high)).max()
-    assert error[1] == pytest.approx(1e-5 / size, rel=1e-9)  # 4e-7 of 24 AU, 1e-5 of 0.7 and of 0.8
+    assert error[0] == pytest.approx(1e-5 / size, rel=1e-9)  # 4e-7 of 24 AU, 1e-5 of 0.7 and of 0.8
 
 
 def test_the_error_does_not_depend_on_where_the_trajectory_is_when_it_is_looked_at():

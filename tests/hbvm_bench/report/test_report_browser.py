@@ -117,15 +117,6 @@ def test_the_page_is_small_and_no_wider_than_its_window_and_all_figures_come(pag
     expect(page.locator("figure .picture svg")).to_have_count(figures)  # those unpacked by the script too
 
 
-def test_nothing_moves_where_motion_is_unwelcome(page):
-    page.locator("#motion").scroll_into_view_if_needed()
-    page.wait_for_timeout(300)
-    expect(page.locator("#motion .picture")).to_be_visible()
-    expect(page.locator("#motion .moving")).to_be_hidden()
-    page.click("#motion [data-view=move]")
-    expect(page.locator("#motion .play")).to_have_text("Play")
-
-
 def test_hostile_names_do_nothing_in_a_browser(page):
     assert page.locator("script").count() == 2  # its data and its own
 
@@ -192,31 +183,7 @@ def test_figures_and_their_numbers_are_saved_from_the_page_itself(page):
     assert len({len(row) for row in rows}) == 1
 
 
-def test_the_system_moves_pauses_and_goes_where_it_is_told(browser, folder):
-    with opened(browser, folder) as page:
-        page.locator("#motion").scroll_into_view_if_needed()
-        page.wait_for_selector("#motion[data-playing=true]")
-        picture = "document.querySelector('#motion canvas').toDataURL()"
-        wait_for_change(page, picture, page.evaluate(picture))
-        page.locator("#motion .play").click()
-        expect(page.locator("#motion .play")).to_have_text("Play")
-        page.wait_for_timeout(100)  # a frame asked for before the pause is still drawn
-        still = page.evaluate(picture)
-        page.wait_for_timeout(300)
-        assert page.evaluate(picture) == still
-        page.locator("#motion .scrub").fill("1000")
-        expect(page.locator("#motion .time")).to_have_text("t = 1000.0")
-        page.locator("#motion select").first.select_option(index=0)
-        page.locator("#motion .scrub").fill("1500")  # a planetoid that is far away is told, and harms nothing
-        expect(page.locator("#motion .told").first).to_contain_text("far away")
-        page.locator("#motion canvas").first.focus()
-        turned = page.evaluate(picture)
-        page.keyboard.press("ArrowLeft")
-        wait_for_change(page, picture, turned)
-
-
 def test_the_keyboard_reaches_every_control(page):
-    page.click("#motion [data-view=move]")
     shown = (
         "[...document.querySelectorAll('button, a[href], input, select, summary, canvas')]"
         ".filter((e) => e.checkVisibility())"

@@ -2,7 +2,6 @@
 
 import base64
 import gzip
-from typing import Literal
 
 import msgspec
 import numpy as np
@@ -13,7 +12,8 @@ from hypothesis import strategies as st
 from hbvm_bench.campaign.file import Campaign, MethodEntry, shipped
 from hbvm_bench.report import pack
 from hbvm_bench.report.document import Details
-from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace, numbers
+from hbvm_bench.report.figures.canvas import new
+from hbvm_bench.report.figures.plots import named, numbers
 from hbvm_bench.report.figures.portraits import crossings
 from hbvm_bench.report.index import not_measured, write_index
 from hbvm_bench.report.markdown import markdown
@@ -26,13 +26,6 @@ from problems.errors import InputError
 from tests.hbvm_bench import made_up_run
 
 
-def plot(kind: Literal["lines", "dots"] = "lines"):
-    x = np.linspace(0.0, 10.0, 101)
-    case = Trace(3, 'a "b", c', x, np.where(x > 9.0, np.nan, x**2))
-    fit = Trace(3, "a", x, x, role="fit", note="t^1/2")
-    return Plot([Panel("p", Axis("x"), Axis("y", log=True), [case, fit])], kind)
-
-
 @settings(max_examples=25, deadline=None)
 @given(st.binary(max_size=3000))
 def test_what_is_packed_can_be_unpacked_and_cannot_end_a_script(data):
@@ -42,16 +35,15 @@ def test_what_is_packed_can_be_unpacked_and_cannot_end_a_script(data):
     assert pack.packed(data) == text
 
 
-def test_the_numbers_of_a_figure_are_those_that_it_draws():
-    table = numbers(plot())
-    (row,) = table.rows
-    assert row[:2] == ("3", 'a "b", c')
-    assert row[-1] == "t^1/2"
-    assert float(row[-2]) == 81.0  # the largest that is finite
-    assert row[table.head.index("at 4")] == "16"
-    assert row[table.head.index("at 10")] == "–"
-    spread = numbers(plot("dots")).rows[0]
-    assert spread[3:6] == ("101", "0", "10")
+def test_the_numbers_of_a_figure_are_those_of_its_labelled_lines():
+    figure, x = new(3.0, 2.0), np.linspace(0.0, 10.0, 101)
+    axes = figure.subplots()
+    assert numbers(figure) is None
+    axes.plot(x, np.where(x > 9.0, np.nan, x**2), label=named(3, 'a "b", c'))
+    axes.plot(x, x)
+    axes.plot([], [], label="in the legend alone")
+    table = numbers(figure)
+    assert table.rows == [("3", 'a "b", c', "", "101", "0", "10", "0", "81", "81")]
 
 
 def test_crossings_of_a_circle_are_where_it_passes_the_axis():

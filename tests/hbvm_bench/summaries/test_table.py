@@ -104,9 +104,9 @@ def test_a_void_number_is_shown_and_not_ranked():
         ("energy_max", 3.4e236, "3.4e+236"),
         ("steps", 1275000.0, "1\u202f275\u202f000"),
         ("warm_seconds", 0.0203, "20.3 ms"),
-        ("z_end", -0.21429082377, "-0.214291"),
-        ("z_end", 5.143e21, "5.143e+21"),
-        ("z_end", 0.0, "0"),
+        ("observable_end", -0.21429082377, "-0.214291"),
+        ("observable_end", 5.143e21, "5.143e+21"),
+        ("observable_end", 0.0, "0"),
     ],
 )
 def test_numbers_are_written_as_their_metric_needs(key, number, text):

@@ -9,6 +9,7 @@ from hbvm_bench.campaign.file import name_of
 from hbvm_bench.campaign.identity import resolve
 from hbvm_bench.campaign.shorter import chosen, quick_run
 from hbvm_bench.commands.studies import race_as_data
+from hbvm_bench.measure.computation import VALUE, packed
 from hbvm_bench.report.figures.style import looks
 from hbvm_bench.report.markdown import printed
 from hbvm_bench.report.page import gather, page_of
@@ -33,8 +34,9 @@ def test_a_stored_race_is_read_back_equal(race, tmp_path):
 
 
 def test_compile_times_that_are_none_are_refused(race):
+    stored = {"compile times of kepler": (None, {VALUE: packed([{"contest": 1}])})}
     with pytest.raises(InputError, match="compile times of the race are damaged"):
-        results.races_of(results_of(race.run, beside={"compile_times": {"contest": 1}}))
+        results.races_of(results_of(race.run, computed=stored))
 
 
 def test_the_json_has_ratios_goals_and_all_samples(race):
