@@ -44,13 +44,13 @@ def packed(value: Any) -> NDArray[Any]:
     return np.frombuffer(msgspec.msgpack.encode(value, enc_hook=_array_out), np.uint8)
 
 
-def unpacked(data: NDArray[Any], run: Callable[[], Any]) -> Any:
+def unpacked(data: NDArray[Any], run: Callable[..., Any]) -> Any:
     """Return the result of a computation from its bytes."""
     kind = get_type_hints(function_of(run))["return"]
     return msgspec.msgpack.decode(data.tobytes(), type=kind, dec_hook=_array_in)
 
 
-def function_of(run: Callable[[], Any]) -> Callable[..., Any]:
+def function_of(run: Callable[..., Any]) -> Callable[..., Any]:
     """Return the function that a task calls."""
     return run.func if isinstance(run, functools.partial) else run
 
