@@ -142,12 +142,22 @@ def lost_invariants(
     return losses
 
 
-def of_losses(losses: Losses) -> tuple[str, ...]:
-    """Return the sentences on what has changed though the method conserves it."""
+def expected(system: System, conserved: Mapping[str, float]) -> Mapping[str, float]:
+    """Return what is looked at: what the method conserves, and what constraints demand of any method."""
+    names = (name for name in ("constraints", "constraint_rates") if system.on_manifold)
+    return dict.fromkeys(names, 0.0) | conserved
+
+
+def of_losses(losses: Losses, conserved: Mapping[str, float]) -> tuple[str, ...]:
+    """Return the sentences on what has changed: what the method conserves, or what constraints demand."""
     return tuple(
-        f"{name} has changed by {error:.1e} relative to its terms (first seen at t = {t!r}), though "
-        "the method conserves it: the field may have a pulse or a bump that is narrower than the steps; "
-        "give breakpoints or max_step."
+        f"{name} has changed by {error:.1e} relative to its terms (first seen at t = {t!r}), "
+        + (
+            "though the method conserves it: the field may have a pulse or a bump that is narrower than the "
+            "steps; give breakpoints or max_step."
+            if name in conserved
+            else "as the method does not conserve constraints; use HBVM(), or shorter steps."
+        )
         for name, (t, error) in losses.items()
     )
 

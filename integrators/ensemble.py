@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from integrators import solution
-from integrators.caveats import LOOKED_AT, lost_invariants, of_losses, warnings
+from integrators.caveats import LOOKED_AT, expected, lost_invariants, of_losses, warnings
 from integrators.plain import (
     doubles,
     packed,
@@ -191,13 +191,14 @@ class Solutions(Trajectories):
         """Warnings about each trajectory, as `integrators.Solution.warnings`."""
         problem = self.problem
         caveat, conserved = self.method.caveat(problem), self.method.conserved(problem.system)
+        looked_at = expected(problem.system, conserved)
         if any(occurrences.after is not None for events in self.events for occurrences in events.values()):
-            conserved = {}  # the events' actions may change it
+            looked_at = {}  # the events' actions may change it
         lost = lost_invariants(
-            problem.system, conserved, self.starts, self._times, self.y, self.par, self.steps
+            problem.system, looked_at, self.starts, self._times, self.y, self.par, self.steps
         )
         return [
-            warnings(problem, start, par, end, caveat, self.extra.get(i, {})) + of_losses(losses)
+            warnings(problem, start, par, end, caveat, self.extra.get(i, {})) + of_losses(losses, conserved)
             for i, (start, par, end, losses) in enumerate(
                 zip(self.starts, self.par, self.y[:, -1], lost, strict=True)
             )

@@ -13,12 +13,13 @@ from problems.errors import InputError, shown
 from problems.graph.stored import items, refuse
 from problems.problem import Problem
 from problems.systems.base import System
+from problems.systems.constrained import Constrained
 from problems.systems.hamiltonian import Hamiltonian
 from problems.systems.lagrangian import Lagrangian
 from problems.systems.poisson import Poisson
 from problems.systems.vector_field import VectorField
 
-_SYSTEMS = {kind.__name__: kind for kind in (Hamiltonian, Lagrangian, Poisson, VectorField)}
+_SYSTEMS = {kind.__name__: kind for kind in (Constrained, Hamiltonian, Lagrangian, Poisson, VectorField)}
 
 
 def packed(value: Any, arrays: dict[str, NDArray[Any]]) -> Any:

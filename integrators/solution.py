@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from integrators.caveats import LOOKED_AT, lost_invariants, of_losses, of_tables, warnings
+from integrators.caveats import LOOKED_AT, expected, lost_invariants, of_losses, of_tables, warnings
 from integrators.plain import (
     doubles,
     packed,
@@ -347,6 +347,15 @@ class Solution:
         return invariants.velocity(self.problem.system, par, self.y, self.t)
 
     @property
+    def multipliers(self) -> Array | None:
+        """Multipliers of the constraints of a `problems.Constrained`, shape (n, m), else ``None``.
+
+        The force of constraint j on coordinate i is ``-multipliers[:, j]`` times the derivative of the
+        constraint by the coordinate.
+        """
+        return self.problem.multipliers(self.y, self.t)
+
+    @property
     def warnings(self) -> tuple[str, ...]:
         """Warnings about a solution that did not fail."""
         problem, extra = self.problem, self.stats.extra
@@ -355,17 +364,18 @@ class Solution:
         if failure := extra.get("checkpoint"):
             said = (*said, failure)
         acted = any(happened.after is not None for happened in self.events.values())
-        conserved = {} if acted or extra.get("sample") == "dense" else self.method.conserved(problem.system)
+        looked_at = not acted and extra.get("sample") != "dense"
+        conserved = self.method.conserved(problem.system) if looked_at else {}
         lost = lost_invariants(
-            problem.system, conserved, problem.y0[None], self.t, self.y[None], problem.par[None],
-            np.array([self.stats.steps]),
+            problem.system, expected(problem.system, conserved) if looked_at else {}, problem.y0[None],
+            self.t, self.y[None], problem.par[None], np.array([self.stats.steps]),
         )[0]  # fmt: skip
         for name, seen in extra.get("losses", {}).items():  # what was seen at checkpoints
             loss = tuple(seen) if len(seen) == 2 else (seen[0], seen[1] / seen[2])  # of version 0.1
             if name not in lost or abs(loss[0] - problem.t0) < abs(lost[name][0] - problem.t0):
                 lost[name] = loss
         left = states_beyond(problem.system, problem.par, self.t, self.y) if self.t.size else None
-        return said + of_losses(lost) + of_tables(left)
+        return said + of_losses(lost, conserved) + of_tables(left)
 
     def invariants(self) -> dict[str, Array]:
         """Return the problem's invariants along the trajectory, by name, with the parameters of each time."""

@@ -6,6 +6,7 @@ from problems.problem import Problem
 from problems.registry import load, names
 from problems.symbolic import from_sympy
 from problems.systems.base import Bodies, System
+from problems.systems.constrained import Constrained
 from problems.systems.hamiltonian import Hamiltonian
 from problems.systems.lagrangian import Lagrangian
 from problems.systems.opaque import Opaque
@@ -14,6 +15,7 @@ from problems.systems.vector_field import VectorField
 
 __all__ = [
     "Bodies",
+    "Constrained",
     "Hamiltonian",
     "InputError",
     "Lagrangian",

@@ -12,10 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from problems import targets
 from problems.analysis import deviations, invariants
+from problems.analysis.manifold import on_manifold
 from problems.checks import NOTHING, Named, checked_arguments
 from problems.errors import InputError, printable, shown
 from problems.quantities import plain_numbers
 from problems.systems.base import System, Value
+from problems.systems.constrained import Constrained
 
 Array = NDArray[np.float64]
 
@@ -52,6 +54,14 @@ class Problem:
         Remarks.
     bodies : sequence of str
         Names of the bodies of an N-body problem.
+    project : bool
+        Whether a start that violates the constraints of a `problems.Constrained` is moved to the nearest one
+        that satisfies them.
+
+    Attributes
+    ----------
+    moved : ndarray, shape (dim,), or None
+        How far ``project`` has moved the start; ``None`` without.
 
     Raises
     ------
@@ -80,6 +90,7 @@ class Problem:
     notes: str
     _made_with: str
     bodies: tuple[str, ...] = ()
+    moved: Array | None = None
 
     @checked_arguments
     def __init__(
@@ -100,11 +111,19 @@ class Problem:
         references: Sequence[str] = (),
         notes: str = "",
         bodies: Sequence[str] = (),
+        project: bool = False,
     ) -> None:
         if not isinstance(system, System):
             raise InputError(f"a Problem needs a Hamiltonian or a VectorField, not {shown(system)}.")
         par = system.pack(parameters)
         state = _start(system, par, t0, {"q0": q0, "p0": p0, "v0": v0, "y0": y0})
+        given_state = state
+        if isinstance(system, Constrained):
+            state = on_manifold(system, par, t0, state, project=project)
+        elif project:
+            raise InputError(
+                f"project=True is for systems with constraints, unlike {system.name}; leave it out."
+            )
         if t0 == t_end:
             raise InputError(f"t_end={shown(t_end)} must differ from t0={shown(t0)}.")
         grid = None if times is None else _numbers("times", times, None)
@@ -114,6 +133,7 @@ class Problem:
             printed.append(f"parameters={ {key: parameters[key] for key in parameters}!r}")
         printed += [f"t0={t0!r}"] if t0 != 0.0 else []
         printed += [f"bodies={list(bodies)!r}"] if bodies else []
+        printed += ["project=True"] if project else []
         values = {
             "system": system,
             "y0": _frozen(state),
@@ -130,6 +150,8 @@ class Problem:
         }
         if bodies:
             values["bodies"] = tuple(bodies)
+        if project:
+            values["moved"] = _frozen(state - given_state)
         for key, value in values.items():
             object.__setattr__(self, key, value)
 
@@ -282,6 +304,10 @@ class Problem:
         ``t``, shape (n,), is needed where the kinetic energy of a Lagrangian depends on time.
         """
         return invariants.velocity(self.system, self.par, y, t)
+
+    def multipliers(self, y: ArrayLike, t: ArrayLike | None = None) -> Array | None:
+        """Return the multipliers of constraints at states, shape (n, m); ``None`` where there are none."""
+        return invariants.multipliers(self.system, self.par, y, t)
 
 
 def _short(numbers: re.Match[str]) -> str:

@@ -13,7 +13,7 @@ of two methods' costs are right to a third there. Other processors were not meas
 
 from dataclasses import dataclass
 
-from problems.analysis.structure import degree
+from problems.analysis.structure import degree, degree_of
 from problems.analysis.switches import depends_on_time_between_switches
 from problems.derive.function import Function
 from problems.graph.nodes import STATE, T, reachable
@@ -112,8 +112,15 @@ def nodes_of(system: System, s: int) -> int:
 
     More than s in any case: the estimate of a step's error is gamma_s, which s nodes do not determine.
     """
-    nu = None if system.energy is None else degree(system)
+    nu = _degree(system)
     return max(2 * s if nu is None else exact_k(nu, s), s + 1)
+
+
+def _degree(system: System) -> int | None:
+    """Return the degree of what the steps keep, the energy or all invariants, if they are polynomials."""
+    if system.on_manifold:
+        return degree_of(root for invariant in system.invariants.values() for root in invariant.roots)
+    return None if system.energy is None else degree(system)
 
 
 def operations(function: Function) -> int:
@@ -216,10 +223,10 @@ def choose(system: System, tol: float, *, lanes: bool = False) -> tuple[int, int
         energy to keep.
     """
     work = Work.counted(system, lanes=lanes)
-    nu = None if system.energy is None else degree(system)
+    nu, keeps = _degree(system), system.energy is not None or bool(system.on_manifold)
 
     def bound(k: int, s: int) -> float | None:
-        exact = system.energy is None or (nu is not None and exact_k(nu, s) <= k)
+        exact = not keeps or (nu is not None and exact_k(nu, s) <= k)
         return None if exact else QUADRATURE_ERRORS[k]
 
     # What a field does between its nodes is not seen; only in time, or where it is code, is it likely.

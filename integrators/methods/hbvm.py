@@ -243,6 +243,8 @@ class HBVM(MethodBase):
 
     def conserved(self, system: System) -> dict[str, float]:
         """Return the energy, with a tolerance: at rounding where s is chosen, or with a projection."""
+        if self.tol is not None and system.on_manifold:
+            return dict.fromkeys(system.invariants, 0.0)
         if self.tol is None or "energy" not in system.invariants:
             return {}
         if system.energy is None and self.projection is None:
@@ -261,10 +263,11 @@ class HBVM(MethodBase):
     def _refusal(self, system: System) -> str | None:
         if self.projection and (why := _not_projected(system)):
             return f"projection={self.projection!r} {why}; leave it out."
-        if system.kind != "poisson" or self.solver in ("auto", "fixed_point"):
+        kept = "a Poisson system's energy" if system.kind == "poisson" else "constraints"
+        if not (system.kind == "poisson" or system.on_manifold) or self.solver in ("auto", "fixed_point"):
             return None
         return (
-            "the equations that keep a Poisson system's energy are solved by fixed-point iteration only; "
+            f"the equations that keep {kept} are solved by fixed-point iteration only; "
             f"leave out solver={self.solver!r}, or use Gauss."
         )
 
@@ -277,7 +280,7 @@ class HBVM(MethodBase):
         return program
 
     def _compiled(self, system: System) -> Any:
-        keep = () if system.kind == "poisson" else None
+        keep = () if system.kind == "poisson" else tuple(system.invariants) if system.on_manifold else None
         tol = self.tol
         if tol is not None:
             from integrators.kernel.program import AdaptiveProgram
@@ -298,7 +301,7 @@ class HBVM(MethodBase):
                 return program(choose_projected(tol))
             alone, many = choose(system, tol), choose(system, tol, lanes=True)
             single = program(alone)
-            if many != alone:
+            if many != alone and keep is None:
                 accurate = many[0] < WIDE and tol == TOLERANCE
                 single.for_many = lambda: program(many, ACCURATE_IN_LANES if accurate else tol)
             return single
@@ -313,6 +316,8 @@ class HBVM(MethodBase):
 def _not_projected(system: System) -> str | None:
     """Return why steps cannot end on a surface of the system's energy; ``None`` if they can."""
     energy = system.invariants.get("energy")
+    if system.on_manifold:
+        return "is not for systems with constraints, whose line integrals conserve the energy"
     if system.kind == "poisson":
         return "is not for Poisson systems, whose line integrals conserve the energy"
     if energy is None or not system.traced:

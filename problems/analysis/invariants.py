@@ -12,6 +12,7 @@ from problems.errors import InputError, shown
 from problems.evaluate.pairs import evaluate
 from problems.graph.nodes import T
 from problems.systems.base import System
+from problems.systems.constrained import Constrained
 from problems.systems.lagrangian import Lagrangian
 
 Array = NDArray[np.float64]
@@ -70,6 +71,14 @@ def guards(system: System, par: Array, y: ArrayLike, t: ArrayLike | None) -> dic
     }
 
 
+def multipliers(system: System, par: Array, y: ArrayLike, t: ArrayLike | None) -> Array | None:
+    """Return the multipliers at states, see `problems.problem.Problem.multipliers`."""
+    if not isinstance(system, Constrained):
+        return None
+    found = along(system.multipliers, par, as_states(system, y), t)
+    return np.stack([value.rounded() for value in found], axis=1)
+
+
 def _scale(system: System, par: Array) -> list[DD]:
     columns = par.shape[1] if par.ndim == 2 else 1
     return evaluate(system.function("velocity_scale"), 0.0, np.zeros((system.dim, columns)), par)
@@ -77,7 +86,7 @@ def _scale(system: System, par: Array) -> list[DD]:
 
 def velocity(system: System, par: Array, y: ArrayLike, t: ArrayLike | None) -> Array | None:
     """Return the velocities at states, see `problems.problem.Problem.velocity`."""
-    states = as_states(system, y)
+    states, system = as_states(system, y), getattr(system, "free", system)
     if isinstance(system, Lagrangian):
         return np.stack([value.rounded() for value in along(system.velocity, par, states, t)], axis=1)
     if not system.separable or system.dof is None:
@@ -88,6 +97,7 @@ def velocity(system: System, par: Array, y: ArrayLike, t: ArrayLike | None) -> A
 
 def momentum(system: System, par: Array, t: float, q: Array, v: Array) -> Array:
     """Return the momenta p = v/c of a separable system, or dL/dv of a Lagrangian, each rounded once."""
+    system = getattr(system, "free", system)
     if isinstance(system, Lagrangian):
         state = np.concatenate([q, v])[:, np.newaxis]
         components = evaluate(system.momentum, t, state, par)

@@ -1,5 +1,7 @@
 """Structure of a traced system: degree, time, coordinates that do not occur."""
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -36,9 +38,16 @@ def degree(system: System, par: ArrayLike | None = None) -> int | None:
     problems.errors.InputError
         If the system has no energy.
     """
+    return degree_of([_energy(system)], par)
+
+
+def degree_of(nodes: Iterable[Node], par: ArrayLike | None = None) -> int | None:
+    """Return the largest degree of nodes as polynomials in the state, as `degree` that of the energy."""
     values = None if par is None else np.asarray(par, dtype=np.float64).tolist()
-    total = _Degree(values).of(_energy(system))
-    return None if total is None else int(max(total, 0))
+    fold = _Degree(values)
+    degrees = [fold.of(node) for node in nodes]
+    known = [d for d in degrees if d is not None]
+    return int(max(0, *known)) if known and len(known) == len(degrees) else None
 
 
 _ZERO = float("-inf")  # the degree of the polynomial 0

@@ -13,6 +13,7 @@ _PARTS = {
 _WRITTEN = {
     "Hamiltonian": ["hamiltonian"],
     "Lagrangian": ["hamiltonian", "momentum"],
+    "Constrained": ["hamiltonian", "field", "multipliers"],
     "VectorField": ["field"],
     "Opaque": [],  # its field is code
     "Poisson": ["hamiltonian", "field", "gradient", "structure"],
@@ -42,7 +43,7 @@ def check_system(state: Mapping[str, Any], classes: Iterable[str]) -> dict[str, 
     dim, dof = integer(state["dim"], 1, 2**53, "its dimension"), state["dof"]
     limits.check("a stored system", "COMPONENTS", dim)
     kind = next((name for name in classes if name in _WRITTEN), "Opaque")
-    canonical = kind in ("Hamiltonian", "Lagrangian")
+    canonical = kind in ("Hamiltonian", "Lagrangian", "Constrained")
     if (dof is not None) != canonical or (dof is not None and 2 * integer(dof, 1, dim + 1, "dof") != dim):
         refuse(f"a {kind} has dim={dim} and dof={shown(dof)}")
     parameters = state["parameters"]
@@ -74,7 +75,7 @@ def check_system(state: Mapping[str, Any], classes: Iterable[str]) -> dict[str, 
     graph, functions = StoredGraph(state["graph"], Shape(dim, dof, n_par)), state["functions"]
     if not isinstance(functions, Mapping) or not set(needed) <= set(functions):
         refuse("it lacks a function")
-    own = {name: functions[name] for name in functions if name in needed or name == "domain"}
+    own = {name: functions[name] for name in functions if name in needed or name in ("domain", "momentum")}
     for name, plain in own.items():
         graph.check_function(plain, name, sizes.get(name))
         if name in scalars and (len(plain[0][0]) != 1 or plain[1]):
