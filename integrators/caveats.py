@@ -28,6 +28,12 @@ PER_STEP = 10.0
 Measured there with ``HBVM(k=8, s=7, tol=1e-12)``: at most 0.1.
 """
 
+FEW_DIGITS = 1e-12
+"""Part of its terms that a line integral may lose before that is told.
+
+Near a singular position of a linkage rounding is amplified: of 200 random ones, see tests, 1e-13 was lost.
+"""
+
 LOOKED_AT = 2000  # states of a solution, or of all of an ensemble, at which conserved quantities are compared
 
 TINY = 1e-280
@@ -85,6 +91,7 @@ def warnings(
         "its line integral needs more nodes, or it is no invariant where the stages are; raise k, or shorten "
         "the steps."
         for name, (first, change, size) in extra.get("lost", {}).items()
+        if change > FEW_DIGITS * size
     )
     if not discontinuities:
         return said
@@ -144,8 +151,7 @@ def lost_invariants(
 
 def expected(system: System, conserved: Mapping[str, float]) -> Mapping[str, float]:
     """Return what is looked at: what the method conserves, and what constraints demand of any method."""
-    names = (name for name in ("constraints", "constraint_rates") if system.on_manifold)
-    return dict.fromkeys(names, 0.0) | conserved
+    return {**({"constraints": 0.0} if system.on_manifold else {}), **conserved}
 
 
 def of_losses(losses: Losses, conserved: Mapping[str, float]) -> tuple[str, ...]:

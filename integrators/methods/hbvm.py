@@ -242,9 +242,12 @@ class HBVM(MethodBase):
         return discontinuities or unknown_discontinuities(problem, k, self.tol, self.breakpoints)
 
     def conserved(self, system: System) -> dict[str, float]:
-        """Return the energy, with a tolerance: at rounding where s is chosen, or with a projection."""
+        """Return the energy, with a tolerance: at rounding where s is chosen, or with a projection.
+
+        Of a system with constraints also these.
+        """
         if self.tol is not None and system.on_manifold:
-            return dict.fromkeys(system.invariants, 0.0)
+            return {name: 0.0 for name in system.invariants if name in system.on_manifold}
         if self.tol is None or "energy" not in system.invariants:
             return {}
         if system.energy is None and self.projection is None:

@@ -46,7 +46,9 @@ def on_manifold(system: Constrained, par: Array, t0: float, y: Array, *, project
     """
     at = _At(system, par, t0)
     if project:
-        y = at.nearest(y)
+        nearest = at.nearest(y)
+        at.check_independent(nearest)
+        return nearest
     at.check_independent(y)
     for name in TERMS:
         values, sizes = at.with_sizes(name, y)
@@ -109,7 +111,8 @@ class _At:
         """Return the nearest state on the manifold."""
         dof, at = self._dof, y.copy()
         for name in TERMS:
-            last, largest = np.inf, np.zeros(self._n)
+            error = last = np.inf
+            largest = np.zeros(self._n)
             for _ in range(ITERATIONS):
                 values, sizes = self.with_sizes(name, at)
                 G, by_momentum = self._matrices(at)
@@ -135,7 +138,7 @@ class _At:
     def _solved(self, matrix: Array, right: Array) -> Array:
         if not np.isfinite(matrix).all():
             raise InputError("constraints are not finite near the start; give another start.")
-        return np.linalg.lstsq(matrix, right, rcond=None)[0]
+        return np.asarray(np.linalg.lstsq(matrix, right, rcond=None)[0], dtype=np.float64)
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -76,6 +76,8 @@ class System:
         The conserved quantities by name, the energy first; a list of numbers is one function.
     on_manifold : frozenset of str
         Invariants that are conserved on a manifold only, such as where constraints hold.
+    derived : frozenset of str
+        Invariants that follow from how the field is derived, and need no check.
     guards : mapping of str to Function
         Quantities that are exactly 0 by a symmetry.
 
@@ -92,6 +94,7 @@ class System:
     kind: ClassVar[str]
     traced: ClassVar[bool] = True
     on_manifold: ClassVar[frozenset[str]] = frozenset()
+    derived: ClassVar[frozenset[str]] = frozenset()
 
     def __init__(
         self,
@@ -218,7 +221,8 @@ class System:
         Parameters
         ----------
         function : callable
-            Returns one number; its arguments are among ``t, q, p, y, par, m``.
+            Returns one number; its arguments are among ``t, q, p, y, par, m``, and ``multipliers`` where
+            there are some.
         label : str
             Description for messages.
         data : tuple of int, optional
@@ -230,11 +234,17 @@ class System:
             For anything that cannot be traced, with the line.
         """
         graph = Graph(self.dof)
-        more = None if data is None else {"data": lambda: arguments.further(graph, "data", self.n_par, data)}
+        more = self._offered(graph)
+        if data is not None:
+            more["data"] = lambda: arguments.further(graph, "data", self.n_par, data)
         value = arguments.call(
             function, graph=graph, dim=self.dim, layout=self._layout, label=label, more=more
         )
         return function_of(graph, [arguments.scalar(value, graph=graph, function=function, label=label)])
+
+    def _offered(self, graph: Graph) -> dict[str, Callable[[], Any]]:
+        """Return further arguments of such functions, by name, and what makes them on a graph."""
+        return {}
 
     def trace_change(self, function: Callable[..., Any], label: str) -> Function:
         """Trace a function of the same arguments that returns another state, and perhaps other parameters.

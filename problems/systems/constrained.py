@@ -13,7 +13,8 @@ from problems.derive.function import Function
 from problems.derive.gradient import gradient
 from problems.errors import InputError, shown
 from problems.graph import arguments
-from problems.graph.nodes import Node, P, T
+from problems.graph.fold import Copy
+from problems.graph.nodes import Graph, Node, P, T
 from problems.graph.source_line import line_of_function
 from problems.systems.base import System, Value
 from problems.systems.hamiltonian import Hamiltonian
@@ -86,7 +87,8 @@ class Constrained(System):
     """
 
     kind = "vector_field"
-    on_manifold: ClassVar[frozenset[str]] = frozenset({"energy", "constraints", "constraint_rates"})
+    on_manifold: ClassVar[frozenset[str]] = frozenset({"energy", "constraints"})
+    derived: ClassVar[frozenset[str]] = on_manifold | {"constraint_rates"}
 
     @checked_arguments
     def __init__(
@@ -114,7 +116,7 @@ class Constrained(System):
             raise InputError(f"the invariant {sorted(taken)[0]!r} is there by itself; give the others only.")
         assert free.dof is not None
         super().__init__(
-            free.name, free.dim, free.dof, free.parameters, invariants, guards, name or free.name
+            repr, free.dim, free.dof, free.parameters, invariants, guards, name or free.name
         )  # fmt: skip
         self._graph = free._graph
         for key in ("hamiltonian", "momentum"):
@@ -148,6 +150,10 @@ class Constrained(System):
         free._start_memories()
         free._list([], [])
         return free
+
+    def _offered(self, graph: Graph) -> dict[str, Callable[[], Any]]:
+        copy = Copy(graph)
+        return {"multipliers": lambda: [copy.of(root) for root in self.multipliers.roots]}
 
     def _traced_constraints(self, constraints: Sequence[Callable[..., Any]]) -> list[tuple[str, Node]]:
         if (

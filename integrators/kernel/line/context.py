@@ -17,7 +17,7 @@ class LineContext(Context):
     mode = Integer()  # INVARIANTS, POISSON
     invariants = Integer()  # how many
     every = Integer()  # rows that it writes
-    measure = Pointer()  # what writes the gradients and then the invariants themselves
+    measure = Pointer()  # what writes the gradients, the invariants themselves and the sizes of the field
     gradients = Array("calls", "every", "lanes")  # in the layout of stage memory
     remainders = Array("calls", "every", "lanes")  # what their first s coefficients leave of the rows
     legendre = Array("coefficient_groups", "every", 8)  # these coefficients
@@ -27,6 +27,7 @@ class LineContext(Context):
     metric = Array("rows")  # the diagonal of W
     active = Array("invariants", kind=int)  # 0 for an invariant that follows from others
     on_manifold = Array("invariants", kind=int)  # 1 for an invariant of the solutions on a manifold only
+    derived = Array("invariants", kind=int)  # 1 for an invariant that needs no check
     order = Array(kind=int)  # in which components are summed up
     ends = Array(kind=int)  # 1 where a partial sum of that order ends
     terms = Array("rows")  # of such a sum

@@ -22,7 +22,7 @@ then vanish exactly, and a fixed-order factorization leaves them so.
 """
 
 from integrators.kernel.native.jit import compiled
-from integrators.kernel.simd.memory import call_field, get, larger, largest, put, splat8, spread, total
+from integrators.kernel.simd.memory import call_field, get, put, splat8, spread, total
 from integrators.kernel.step.fixed_point import multiply
 from integrators.kernel.step.stages import group_offset, offset
 
@@ -162,8 +162,9 @@ def measure_gap(ctx):
 
     What is more than rounding was lost by the quadrature (k too small); it is
     added up and stays lost: the invariants are then kept at what they are now. At a start without a
-    past they are what they are. Rounding is a part of the largest terms so far: at a turning point
-    those of the moment nearly vanish. Uses the first stages, which the previous step does not need any more.
+    past they are what they are. Rounding is a part of the largest terms so far, those of the field among
+    them: at a turning point those of the moment nearly vanish. Uses the first stages, which the previous
+    step does not need any more.
     """
     remainders, reference, owed, terms = ctx.remainders, ctx.reference, ctx.owed, ctx.terms
     active, largest, lost = ctx.active, ctx.largest, ctx.lost
@@ -179,7 +180,8 @@ def measure_gap(ctx):
         scale = abs(value) + abs(reference[a])
         for d in range(dim):
             slope = remainders[lanes * (dim * a + d)]
-            scale += abs(slope) * (abs(state[d]) + abs(ctx.length) * steepest(ctx, d))
+            added = abs(ctx.length) * remainders[lanes * (dim * n + n + d)]
+            scale += abs(slope) * (abs(state[d]) + added)
             terms[d] = slope * error[d]
         gap += ordered(ctx)
         largest[a] = max(largest[a], scale)
@@ -193,15 +195,6 @@ def measure_gap(ctx):
             lost[a] += abs(gap)
             reference[a], gap = value, 0.0
         owed[a] = GAIN * gap
-
-
-@compiled
-def steepest(ctx, d):
-    """Return the largest of row d's values in the previous step."""
-    top = splat8(0.0)
-    for chunk in range(ctx.chunks):
-        top = larger(top, abs(get(ctx.values, offset(ctx, chunk) + ctx.lanes * d)))
-    return largest(top)
 
 
 @compiled
@@ -226,7 +219,7 @@ def find_change(ctx, threshold):
             size += total(sizes)
         slope = abs(ordered(ctx))
         # a gradient that is not finite is no good either
-        if not slope <= (2.0 if ctx.on_manifold[a] else threshold) * size:
+        if not slope <= (2.0 if ctx.derived[a] else threshold) * size:
             ctx.culprit, ctx.change_rate = a, slope / size
             return True
     return False

@@ -14,6 +14,7 @@ from integrators.kernel.native.field import compile_field
 from integrators.kernel.tables import Constants, packed
 from integrators.protocol import Array
 from problems import targets
+from problems.analysis.sizes import with_sizes
 from problems.derive.function import Function
 from problems.errors import InputError
 from problems.graph.nodes import T
@@ -53,14 +54,17 @@ class Kept:
         self.system = system
         scalars = {part: scalar for name in invariants for part, scalar in components(system, name).items()}
         self.names = list(scalars)
-        self._on_manifold = [name.partition("[")[0] in system.on_manifold for name in self.names]
+        whole = [name.partition("[")[0] for name in self.names]
+        self._on_manifold = [name in system.on_manifold for name in whole]
+        self._derived = [name in system.derived for name in whole]
         n, dim = len(self.names), system.dim
         self.code = [line.code()]
         if n:
             assert system.field is not None  # LineIntegral refuses code
             gradients = [system.gradient(scalar) for scalar in scalars.values()]
             self.values = system.together(system.field, *gradients)
-            measure = system.together(*gradients, *scalars.values())
+            sizes = with_sizes(system.field).part(dim, 2 * dim)
+            measure = system.together(*gradients, *scalars.values(), sizes)
             self.code.append(compile_field(system, measure, constants.lanes))
         else:
             assert isinstance(system, Poisson)
@@ -74,7 +78,7 @@ class Kept:
         self._numbers = {
             "mode": INVARIANTS if n else POISSON,
             "invariants": n,
-            "every": dim * n + max(dim, n) if n else dim * (1 + dim),
+            "every": dim * n + dim + n if n else dim * (1 + dim),
             "coefficient_groups": -(-constants.s // 8),
         }
 
@@ -90,7 +94,7 @@ class Kept:
 
     def share(self, own: Context, partial: Context) -> None:
         """Let partial steps keep what the steps do."""
-        for name in ("active", "owed", "metric", "on_manifold") if self.names else ():
+        for name in ("active", "owed", "metric", "on_manifold", "derived") if self.names else ():
             partial.point({name: getattr(own, name)})
 
     @property
@@ -122,7 +126,7 @@ class Kept:
         own.change_rate = partial.change_rate = 0.0
         if self.names:
             own.largest[:] = own.lost[:] = own.first_loss[:] = 0.0
-            own.on_manifold[:] = self._on_manifold
+            own.on_manifold[:], own.derived[:] = self._on_manifold, self._derived
             own.metric[:] = metric_of(self.system, par)
             own.active[:] = independent(self.system, self.values, own.metric, y, par, t0)
 

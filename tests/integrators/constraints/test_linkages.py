@@ -1,0 +1,44 @@
+"""A random search over linkages: none is silently wrong."""
+
+import numpy as np
+import pytest
+
+from integrators import DOP853, HBVM, integrate
+from problems import Problem
+
+from .linkages import linkage
+
+TIMES = np.linspace(0.0, 5.0, 11)[1:]
+
+
+def checked(number):
+    """Compare a linkage with DOP853 and with a start moved by rounding, and return what is wrong."""
+    problem = linkage(number)
+    solution = integrate(problem, HBVM(max_steps=30_000), TIMES)
+    if solution.status != "finished" or solution.warnings:
+        return []  # it says so
+    wrong = [f"{name}: {error.max():.1e}" for name, error in solution.errors().items() if error.max() > 1e-11]
+    reference = integrate(problem, DOP853(rtol=1e-13, atol=1e-15), TIMES)
+    if np.abs(problem.y0[problem.system.dof :]).max() < 1e-12:
+        return wrong  # the rods allow no motion
+    moved = problem.y0 * (1.0 + 1e-13 * np.where(np.arange(problem.y0.size) % 2, 1.0, -1.0))
+    beside = integrate(
+        Problem(problem.system, y0=moved, t_end=5.0, project=True), HBVM(max_steps=30_000), TIMES
+    )
+    if reference.status == "finished" == beside.status:
+        sensitive = np.abs(beside.q - solution.q).max(axis=0)
+        error = np.abs(reference.q - solution.q).max(axis=0)
+        if (error > 1e-8 + 100.0 * sensitive).any():
+            wrong.append(f"positions: {error.max():.1e}, sensitive to {sensitive.max():.1e}")
+    return wrong
+
+
+@pytest.mark.parametrize("number", range(20))
+def test_a_random_linkage_is_right_or_says_that_it_is_not(number):
+    assert checked(number) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", range(20, 200))
+def test_more_random_linkages_are_right_or_say_that_they_are_not(number):
+    assert checked(number) == []
