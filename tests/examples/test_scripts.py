@@ -25,6 +25,7 @@ SAYS = {
     "short.py": ["accurate: HBVM(tol=1e-12), heyoka, SciPy's DOP853"],
     "molecular_dynamics.py": ["accurate: HBVM(k=4, s=2, h=0.005), Verlet"],
     "geodesics.py": ["from 3.30 to 20.47 ", "energy kept: True"],
+    "linkages.py": ["energy and rods at round-off: True"],
     "lattice.py": ["accurate: HBVM(k=8, s=4, h=0.25), heyoka, SciPy's DOP853"],
     "bodies.py": ["the same places to 1e-8 au: True", "names are kept: True"],
     "chaos_map.py": ["regular and chaotic alike: True", "the difference of two orbits: True", "12 x 12 in "],

@@ -10,14 +10,15 @@ INVARIANTS, POISSON = range(2)
 class LineContext(Context):
     """A trajectory of a line integral.
 
-    The function behind `Context.field` writes `every` rows for a block of stages: the field
-    and the gradients, dim (1 + n) of them; or grad H and B, dim (1 + dim).
+    The function behind `Context.field` writes rows for a block of stages, `every` of them at most: the field,
+    dim rows, and the entries of the gradients that are not identically 0, invariant by invariant; or grad H
+    and B, dim (1 + dim).
     """
 
     mode = Integer()  # INVARIANTS, POISSON
     invariants = Integer()  # how many
     every = Integer()  # rows that it writes
-    measure = Pointer()  # what writes the gradients, the invariants themselves and the sizes of the field
+    measure = Pointer()  # what writes the gradients and then the invariants themselves
     gradients = Array("calls", "every", "lanes")  # in the layout of stage memory
     remainders = Array("calls", "every", "lanes")  # what their first s coefficients leave of the rows
     legendre = Array("coefficient_groups", "every", 8)  # these coefficients
@@ -28,9 +29,26 @@ class LineContext(Context):
     active = Array("invariants", kind=int)  # 0 for an invariant that follows from others
     on_manifold = Array("invariants", kind=int)  # 1 for an invariant of the solutions on a manifold only
     derived = Array("invariants", kind=int)  # 1 for an invariant that needs no check
-    order = Array(kind=int)  # in which components are summed up
-    ends = Array(kind=int)  # 1 where a partial sum of that order ends
-    terms = Array("rows")  # of such a sum
+    entries = Integer()  # of the gradients
+    sized = Integer()  # 1 where rows with the sizes of the field's terms follow them
+    column = Array(kind=int)  # of each entry, its component of the state
+    # The entries of each component, by the invariants: where they begin, their rows and their invariants
+    column_first = Array(kind=int)
+    column_row = Array(kind=int)
+    column_owner = Array(kind=int)
+    # Pairs of invariants (a, b), b <= a, that share components: where their products begin, and their rows
+    pairs = Integer()
+    pair_first = Array(kind=int)
+    pair_a = Array(kind=int)
+    pair_b = Array(kind=int)
+    diagonal = Array(kind=int)  # the pair (a, a)
+    row_a = Array(kind=int)
+    row_b = Array(kind=int)
+    ends = Array(kind=int)  # 1 where a partial sum of the products ends
+    # The factors: the invariants in the order of elimination, and of each row of L the columns before it
+    turn = Array(kind=int)
+    lower_first = Array(kind=int)
+    lower_column = Array(kind=int)
     gram = Table("invariants", "invariants")
     lower = Table("invariants", "invariants")
     pivots = Array("invariants")

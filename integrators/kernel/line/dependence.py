@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from integrators.kernel.line.pattern import Pattern
 from integrators.protocol import Array
 from problems import targets
 from problems.problem import System
@@ -16,7 +17,13 @@ NEARLY = 0.1
 
 
 def independent(
-    system: System, quantity: targets.Quantity, metric: Array, y: Array, par: Array, t: float
+    system: System,
+    quantity: targets.Quantity,
+    pattern: Pattern,
+    metric: Array,
+    y: Array,
+    par: Array,
+    t: float,
 ) -> NDArray[np.bool_]:
     """Tell which invariants to keep so that all are kept, one gradient orthogonalized after another.
 
@@ -31,7 +38,9 @@ def independent(
     system : System
         Whose invariants they are.
     quantity : Function
-        The field and the gradients of n scalar invariants, for the emitters.
+        The field and the entries of the gradients of n scalar invariants, for the emitters.
+    pattern : Pattern
+        Where these are.
     metric : ndarray, shape (dim,)
         Diagonal of the metric in which gradients are compared.
     y, par, t
@@ -49,7 +58,9 @@ def independent(
         rate = float(np.abs(slope).max() / np.abs(y).max())
         shift = SHIFT / rate if 0.0 < rate < np.inf else 0.0
         points = [y, *(_moved(lambda s, x: function(s, x, par)[:dim], t, y, h) for h in (shift, -shift))]
-        remainders = np.stack([function(t, point, par)[dim:].reshape(-1, dim) for point in points])
+        remainders = np.stack(
+            [pattern.gradients(function(t, point, par)[dim : dim + pattern.count]) for point in points]
+        )
         remainders = remainders * np.sqrt(metric)
         # So that squares have doubles
         remainders /= _power_of_two(np.abs(remainders).max(axis=(0, 2)))[:, None]

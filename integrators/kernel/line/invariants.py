@@ -16,13 +16,13 @@ of size h^{2s} without cancellation; it is this sum that is computed. An invaria
 manifold, such as the energy of a system with constraints, has g_i'f = 0 there only, which stages
 leave by the stage order: for such invariants it is the former sum.
 
-The order of every sum is that of the array ``order``: the same coordinate of all
-bodies first. Where bodies mirror each other, the sums that vanish by symmetry
-then vanish exactly, and a fixed-order factorization leaves them so.
+The order of every sum is fixed: the same coordinate of all bodies first. Where bodies mirror each other, the
+sums that vanish by symmetry then vanish exactly, and a fixed-order factorization leaves them so. What is
+identically 0 in the gradients, in the matrix and in its factors is left out: n rods of a chain cost O(n).
 """
 
 from integrators.kernel.native.jit import compiled
-from integrators.kernel.simd.memory import call_field, get, put, splat8, spread, total
+from integrators.kernel.simd.memory import call_field, get, larger, largest, put, splat8, spread, total
 from integrators.kernel.step.fixed_point import multiply
 from integrators.kernel.step.stages import group_offset, offset
 
@@ -39,23 +39,10 @@ def row(ctx, chunk):
 
 
 @compiled
-def ordered(ctx):
-    """Sum up ``terms`` in order, partial sums first."""
-    terms, order, ends = ctx.terms, ctx.order, ctx.ends
-    whole, part = 0.0, 0.0
-    for i in range(ctx.rows):
-        part += terms[order[i]]
-        if ends[i]:
-            whole += part
-            part = 0.0
-    return whole
-
-
-@compiled
 def keep_invariants(ctx):
     """Set ``values`` to f - W sum_i g_i alpha_i, from ``found``."""
     lanes, every, dim, n = ctx.lanes, ctx.every, ctx.rows, ctx.invariants
-    width, groups, chunks = dim * (1 + n), ctx.coefficient_groups, ctx.chunks
+    width, groups, chunks = dim + ctx.entries, ctx.coefficient_groups, ctx.chunks
     multiply(ctx.onto, groups, chunks, ctx.gradients, lanes, ctx.legendre, 8, width, every)
     multiply(ctx.back, chunks, groups, ctx.legendre, 8, ctx.remainders, lanes, width, every)
     set_gram(ctx)
@@ -67,92 +54,108 @@ def keep_invariants(ctx):
     solve_gram(ctx, right, DEPENDENT)
     for a in range(n):
         alpha[a] += right[a]
+    first, rows, owners = ctx.column_first, ctx.column_row, ctx.column_owner
     for chunk in range(chunks):
         sums, values = ctx.gradients + row(ctx, chunk), ctx.values + offset(ctx, chunk)
         for d in range(dim):
             moved = splat8(0.0)
-            for a in range(n):
-                moved += spread(alpha, a) * get(sums, lanes * (dim * (1 + a) + d))
+            for i in range(first[d], first[d + 1]):
+                moved += spread(alpha, owners[i]) * get(sums, lanes * rows[i])
             put(values, lanes * d, get(sums, lanes * d) - spread(ctx.metric, d) * moved)
 
 
 @compiled
 def set_gram(ctx):
     """Set the matrix of the equations for alpha, its lower half."""
-    terms, legendre, metric, gram = ctx.terms, ctx.legendre, ctx.metric, ctx.gram
-    dim, every, n = ctx.rows, ctx.every, ctx.invariants
-    for a in range(n):
-        for b in range(a + 1):
-            first, second = dim * (1 + a), dim * (1 + b)
-            for d in range(dim):
-                products = splat8(0.0)
-                for group in range(ctx.coefficient_groups):
-                    i = 8 * every * group
-                    products += get(legendre, i + 8 * (first + d)) * get(legendre, i + 8 * (second + d))
-                terms[d] = total(products) * metric[d]
-            gram[n * a + b] = ordered(ctx)
+    legendre, metric, column = ctx.legendre, ctx.metric, ctx.column
+    dim, every = ctx.rows, ctx.every
+    for pair in range(ctx.pairs):
+        whole, part = 0.0, 0.0
+        for i in range(ctx.pair_first[pair], ctx.pair_first[pair + 1]):
+            first, second = ctx.row_a[i], ctx.row_b[i]
+            products = splat8(0.0)
+            for group in range(ctx.coefficient_groups):
+                j = 8 * every * group
+                products += get(legendre, j + 8 * first) * get(legendre, j + 8 * second)
+            part += total(products) * metric[column[first - dim]]
+            if ctx.ends[i]:
+                whole += part
+                part = 0.0
+        ctx.gram[ctx.invariants * ctx.pair_a[pair] + ctx.pair_b[pair]] = whole
 
 
 @compiled
 def set_right(ctx):
     """Set r."""
-    lanes, dim, terms, weights = ctx.lanes, ctx.rows, ctx.terms, ctx.tables.weights
-    width = dim * (1 + ctx.invariants)
+    lanes, dim, weights, column = ctx.lanes, ctx.rows, ctx.tables.weights, ctx.column
+    legendre, every = ctx.legendre, ctx.every
     for chunk in range(ctx.chunks):
         sums, remainders = ctx.gradients + row(ctx, chunk), ctx.remainders + row(ctx, chunk)
-        for d in range(width):
+        for d in range(dim + ctx.entries):
             put(remainders, lanes * d, get(sums, lanes * d) - get(remainders, lanes * d))
-    legendre, every, groups = ctx.legendre, ctx.every, ctx.coefficient_groups
     for a in range(ctx.invariants):
-        for d in range(dim):
+        pair = ctx.diagonal[a]
+        whole, part = 0.0, 0.0
+        for i in range(ctx.pair_first[pair], ctx.pair_first[pair + 1]):
+            entry = ctx.row_a[i]
+            d = column[entry - dim]
             products = splat8(0.0)
             if ctx.on_manifold[a]:
-                for group in range(groups):
-                    i = 8 * every * group
-                    products += get(legendre, i + 8 * d) * get(legendre, i + 8 * (dim * (1 + a) + d))
-                terms[d] = total(products)
-                continue
-            for chunk in range(ctx.chunks):
-                remainders = ctx.remainders + row(ctx, chunk)
-                product = get(remainders, lanes * d) * get(remainders, lanes * (dim * (1 + a) + d))
-                products += get(weights, 8 * chunk) * product
-            terms[d] = -total(products)
-        ctx.right[a] = ordered(ctx)
+                for group in range(ctx.coefficient_groups):
+                    j = 8 * every * group
+                    products += get(legendre, j + 8 * d) * get(legendre, j + 8 * entry)
+                part += total(products)
+            else:
+                for chunk in range(ctx.chunks):
+                    remainders = ctx.remainders + row(ctx, chunk)
+                    product = get(remainders, lanes * d) * get(remainders, lanes * entry)
+                    products += get(weights, 8 * chunk) * product
+                part -= total(products)
+            if ctx.ends[i]:
+                whole += part
+                part = 0.0
+        ctx.right[a] = whole
 
 
 @compiled
 def solve_gram(ctx, right, threshold):
-    """Replace ``right`` by the solution, by LDL' in the order of the invariants, without small pivots."""
+    """Replace ``right`` by the solution, by LDL' in the order of ``turn``, without small pivots."""
     gram, lower, pivots, active = ctx.gram, ctx.lower, ctx.pivots, ctx.active
+    turn, first, columns = ctx.turn, ctx.lower_first, ctx.lower_column
     n = ctx.invariants
-    for a in range(n):
+    for i in range(n):
+        a = turn[i]
         pivot = gram[n * a + a]
-        for b in range(a):
-            value = gram[n * a + b]
-            for c in range(b):
-                value -= lower[n * a + c] * lower[n * b + c] * pivots[c]
-            lower[n * a + b] = value / pivots[b] if pivots[b] > 0.0 else 0.0
-            pivot -= lower[n * a + b] * lower[n * a + b] * pivots[b]
-        pivots[a] = pivot if active[a] and pivot > threshold * gram[n * a + a] else 0.0
-        for b in range(a):
-            right[a] -= lower[n * a + b] * right[b]
-        if pivots[a] == 0.0:
+        for at in range(first[i], first[i + 1]):
+            j = columns[at]
+            b = turn[j]
+            value = gram[n * max(a, b) + min(a, b)]
+            for before in range(first[j], first[j + 1]):
+                k = columns[before]
+                value -= lower[n * i + k] * lower[n * j + k] * pivots[k]
+            lower[n * i + j] = value / pivots[j] if pivots[j] > 0.0 else 0.0
+            pivot -= lower[n * i + j] * lower[n * i + j] * pivots[j]
+        pivots[i] = pivot if active[a] and pivot > threshold * gram[n * a + a] else 0.0
+        for at in range(first[i], first[i + 1]):
+            right[a] -= lower[n * i + columns[at]] * right[turn[columns[at]]]
+        if pivots[i] == 0.0:
             right[a] = 0.0
-    for a in range(n):
-        right[a] = right[a] / pivots[a] if pivots[a] > 0.0 else 0.0
-    for a in range(n - 1, -1, -1):
-        for b in range(a + 1, n):
-            if pivots[a] > 0.0:
-                right[a] -= lower[n * b + a] * right[b]
+    for i in range(n):
+        right[turn[i]] = right[turn[i]] / pivots[i] if pivots[i] > 0.0 else 0.0
+    for i in range(n - 1, -1, -1):
+        for at in range(first[i], first[i + 1]):
+            j = columns[at]
+            if pivots[j] > 0.0:
+                right[turn[j]] -= lower[n * i + j] * right[turn[i]]
 
 
 @compiled
 def correction(ctx, d):
     """Return component d of W sum_i phi_i0 alpha_i."""
-    legendre, alpha, dim = ctx.legendre, ctx.alpha, ctx.rows
+    legendre, alpha = ctx.legendre, ctx.alpha
     value = 0.0
-    for a in range(ctx.invariants):
-        value += legendre[8 * (dim * (1 + a) + d)] * alpha[a]
+    for i in range(ctx.column_first[d], ctx.column_first[d + 1]):
+        value += legendre[8 * ctx.column_row[i]] * alpha[ctx.column_owner[i]]
     return ctx.metric[d] * value
 
 
@@ -166,24 +169,31 @@ def measure_gap(ctx):
     them: at a turning point those of the moment nearly vanish. Uses the first stages, which the previous
     step does not need any more.
     """
-    remainders, reference, owed, terms = ctx.remainders, ctx.reference, ctx.owed, ctx.terms
+    remainders, reference, owed = ctx.remainders, ctx.reference, ctx.owed
     active, largest, lost = ctx.active, ctx.largest, ctx.lost
     state, error, lanes, dim, n = ctx.state, ctx.error, ctx.lanes, ctx.rows, ctx.invariants
+    column, entries = ctx.column, ctx.entries
     for lane in range(lanes):
         ctx.times[lane] = ctx.t0
         for d in range(dim):
             ctx.stages[lanes * d + lane] = state[d]
     call_field(ctx.measure, ctx.times, ctx.stages, ctx.par, remainders)
     for a in range(n):
-        value = remainders[lanes * (dim * n + a)]
+        value = remainders[lanes * (entries + a)]
         gap = value - reference[a]
         scale = abs(value) + abs(reference[a])
-        for d in range(dim):
-            slope = remainders[lanes * (dim * a + d)]
-            added = abs(ctx.length) * remainders[lanes * (dim * n + n + d)]
-            scale += abs(slope) * (abs(state[d]) + added)
-            terms[d] = slope * error[d]
-        gap += ordered(ctx)
+        pair = ctx.diagonal[a]
+        whole, part = 0.0, 0.0
+        for i in range(ctx.pair_first[pair], ctx.pair_first[pair + 1]):
+            entry = ctx.row_a[i] - dim
+            d = column[entry]
+            slope = remainders[lanes * entry]
+            scale += abs(slope) * (abs(state[d]) + abs(ctx.length) * steepest(ctx, d))
+            part += slope * error[d]
+            if ctx.ends[i]:
+                whole += part
+                part = 0.0
+        gap += whole
         largest[a] = max(largest[a], scale)
         if ctx.length == 0.0:
             reference[a], gap = value, 0.0
@@ -198,26 +208,44 @@ def measure_gap(ctx):
 
 
 @compiled
+def steepest(ctx, d):
+    """Return the largest of row d's values, or of the sums of its absolute terms, in the previous step."""
+    top = splat8(0.0)
+    for chunk in range(ctx.chunks):
+        if ctx.sized:
+            size = get(ctx.gradients + row(ctx, chunk), ctx.lanes * (ctx.rows + ctx.entries + d))
+        else:
+            size = get(ctx.values, offset(ctx, chunk) + ctx.lanes * d)
+        top = larger(top, abs(size))
+    return largest(top)
+
+
+@compiled
 def find_change(ctx, threshold):
     """Return whether one of the invariants is none: `LineContext.culprit`.
 
     Its gradient along the field, summed over the stages, is compared with the sum
     of the absolute values of the terms; their ratio is left in `LineContext.change_rate`.
     """
-    terms, weights, lanes, dim = ctx.terms, ctx.tables.weights, ctx.lanes, ctx.rows
+    weights, lanes, dim = ctx.tables.weights, ctx.lanes, ctx.rows
     for a in range(ctx.invariants):
-        size = 0.0
-        for d in range(dim):
+        size, whole, part = 0.0, 0.0, 0.0
+        pair = ctx.diagonal[a]
+        for i in range(ctx.pair_first[pair], ctx.pair_first[pair + 1]):
+            entry = ctx.row_a[i]
             products, sizes = splat8(0.0), splat8(0.0)
             for chunk in range(ctx.chunks):
                 sums = ctx.gradients + row(ctx, chunk)
-                product = get(sums, lanes * d) * get(sums, lanes * (dim * (1 + a) + d))
+                product = get(sums, lanes * ctx.column[entry - dim]) * get(sums, lanes * entry)
                 term = get(weights, 8 * chunk) * product
                 products += term
                 sizes += abs(term)
-            terms[d] = total(products)
+            part += total(products)
             size += total(sizes)
-        slope = abs(ordered(ctx))
+            if ctx.ends[i]:
+                whole += part
+                part = 0.0
+        slope = abs(whole)
         # a gradient that is not finite is no good either
         if not slope <= (2.0 if ctx.derived[a] else threshold) * size:
             ctx.culprit, ctx.change_rate = a, slope / size

@@ -10,6 +10,7 @@ from integrators.kernel.context import Context, Shape
 from integrators.kernel.engines import line
 from integrators.kernel.line.context import INVARIANTS, POISSON, LineContext
 from integrators.kernel.line.dependence import independent
+from integrators.kernel.line.pattern import Pattern
 from integrators.kernel.native.field import compile_field
 from integrators.kernel.tables import Constants, packed
 from integrators.protocol import Array
@@ -59,26 +60,33 @@ class Kept:
         self._derived = [name in system.derived for name in whole]
         n, dim = len(self.names), system.dim
         self.code = [line.code()]
+        pattern = Pattern.of(system, [])
         if n:
             assert system.field is not None  # LineIntegral refuses code
             gradients = [system.gradient(scalar) for scalar in scalars.values()]
-            self.values = system.together(system.field, *gradients)
-            sizes = with_sizes(system.field).part(dim, 2 * dim)
-            measure = system.together(*gradients, *scalars.values(), sizes)
+            pattern = Pattern.of(system, gradients)
+            entries = [pattern.entries(a, gradient) for a, gradient in enumerate(gradients)]
+            # Forces of constraints cancel others, and rounding is a part of each
+            sizes = [with_sizes(system.field).part(dim, 2 * dim)] if system.on_manifold else []
+            self.values = system.together(system.field, *entries, *sizes)
+            measure = system.together(*entries, *scalars.values())
             self.code.append(compile_field(system, measure, constants.lanes))
         else:
             assert isinstance(system, Poisson)
             self.values = system.together(system.slope, system.structure)
+        self._pattern = pattern
         basis = legendre(constants.arrays["nodes"].reshape(-1), constants.s)
-        order, ends = order_of_sums(system)
         self._tables: dict[str, NDArray[Any]] = {
             "onto": packed(constants.arrays["projection"]), "back": packed(basis, repeat=True),
-            "order": order, "ends": ends,
+            **pattern.tables,
         }  # fmt: skip
         self._numbers = {
             "mode": INVARIANTS if n else POISSON,
             "invariants": n,
-            "every": dim * n + dim + n if n else dim * (1 + dim),
+            "entries": pattern.count,
+            "pairs": len(pattern.tables["pair_a"]),
+            "every": dim + pattern.count + max(dim, n) if n else dim * (1 + dim),
+            "sized": int(bool(system.on_manifold)),
             "coefficient_groups": -(-constants.s // 8),
         }
 
@@ -128,7 +136,7 @@ class Kept:
             own.largest[:] = own.lost[:] = own.first_loss[:] = 0.0
             own.on_manifold[:], own.derived[:] = self._on_manifold, self._derived
             own.metric[:] = metric_of(self.system, par)
-            own.active[:] = independent(self.system, self.values, own.metric, y, par, t0)
+            own.active[:] = independent(self.system, self.values, self._pattern, own.metric, y, par, t0)
 
 
 def components(system: System, name: str) -> Mapping[str, Function]:
@@ -151,28 +159,9 @@ def metric_of(system: System, par: Array) -> Array:
     With masses m, c = 1/m: corrections are then accelerations of one size for light
     and heavy bodies alike. W does not depend on the state, so the method is symmetric.
     """
-    if system.separable and system.dof is not None:
-        c = targets.numpy(system, "velocity_scale")(0.0, np.zeros(system.dim), par)
+    free = getattr(system, "free", system)
+    if free.separable and system.dof is not None:
+        c = targets.numpy(free, "velocity_scale")(0.0, np.zeros(system.dim), par)
         if np.isfinite(c).all() and (c > 0.0).all():
             return np.concatenate([c, 1.0 / c])
     return np.ones(system.dim)
-
-
-def order_of_sums(system: System) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the order in which components are summed up, and where its partial sums end.
-
-    The same coordinate of all bodies, body by body, makes a partial sum: in an
-    odd sum over two bodies that mirror each other it is exactly 0. Without bodies,
-    positions and momenta make one each.
-    """
-    indices = np.arange(system.dim)
-    if system.bodies is not None and system.dof is not None:
-        groups = list(
-            indices.reshape(2, -1, system.bodies.dimension)
-            .transpose(0, 2, 1)
-            .reshape(2 * system.bodies.dimension, -1)
-        )
-    else:
-        groups = np.array_split(indices, 1 if system.dof is None else 2)
-    ends = [np.arange(group.size) == group.size - 1 for group in groups]
-    return np.concatenate(groups).astype(np.int64), np.concatenate(ends).astype(np.int64)
