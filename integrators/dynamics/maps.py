@@ -340,8 +340,8 @@ def lyapunov_map(
     >>> (found.intervals[:, 0, 0] > 0.0).tolist()
     [False, True]
     """
-    n, end = checked_span(problem, count, t_end, skip)
     many = Many.of("lyapunov_map", problem, method, starts, parameters, threads)
+    n, end = checked_span(problem, count, t_end, skip)
     in_lanes = partial(_largest, many, end, skip, n) if n < problem.system.dim else None
     state, warning = many.followed(
         f"lyapunov {(n, end, skip)}", (3 * n + 3,),
