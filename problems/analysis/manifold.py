@@ -75,9 +75,19 @@ class _At:
         return np.array([float(value.rounded()[0]) for value in found])
 
     def with_sizes(self, name: str, y: Array) -> tuple[Array, Array]:
-        """Return the constraints or their rates, and the sums of their absolute terms."""
+        """Return the constraints or their rates, and sizes that these are judged by.
+
+        Those are the sums of their absolute terms; of a rate w = G u at least the bound
+        ``w^2 <= (G M^-1 G') (u M u)``, as all terms vanish where other constraints allow no motion.
+        """
         both = self._values(with_sizes(self._system.invariants[name]), y)
-        return both[: self._n], both[self._n :]
+        values, sizes = both[: self._n], both[self._n :]
+        if name == TERMS[1]:
+            G, by_momentum = self._matrices(y)
+            u = self._values(self._system.field.part(0, self._dof), y)
+            energy = np.abs(u * y[self._dof :]).sum()
+            sizes = np.maximum(sizes, np.sqrt(np.abs((by_momentum * G).sum(axis=1)) * energy))
+        return values, sizes
 
     def _slopes(self, name: str, y: Array) -> Array:
         gradient = self._system.gradient(name)
