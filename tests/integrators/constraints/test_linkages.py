@@ -17,7 +17,9 @@ def checked(number):
     solution = integrate(problem, HBVM(max_steps=30_000), TIMES)
     if solution.status != "finished" or solution.warnings:
         return []  # it says so
-    wrong = [f"{name}: {error.max():.1e}" for name, error in solution.errors().items() if error.max() > 1e-11]
+    most = {"energy": 1e-11, "constraints": 1e-11, "constraint_rates": 1e-9}  # near singular positions
+    errors = {name: float(error.max()) for name, error in solution.errors().items()}
+    wrong = [f"{name}: {error:.1e}" for name, error in errors.items() if error > most[name]]
     reference = integrate(problem, DOP853(rtol=1e-13, atol=1e-15), TIMES)
     if np.abs(problem.y0[problem.system.dof :]).max() < 1e-12:
         return wrong  # the rods allow no motion
