@@ -84,7 +84,7 @@ class _At:
         values, sizes = both[: self._n], both[self._n :]
         if name == TERMS[1]:
             G, by_momentum = self._matrices(y)
-            u = self._values(self._system.field.part(0, self._dof), y)
+            u = self._values(self._system.function("field").part(0, self._dof), y)
             energy = np.abs(u * y[self._dof :]).sum()
             sizes = np.maximum(sizes, np.sqrt(np.abs((by_momentum * G).sum(axis=1)) * energy))
         return values, sizes
