@@ -52,7 +52,7 @@ def put_nodes(search, chunk, degree):
 
 @compiled
 def weigh(ctx, c, terms, table):
-    """Set the weights of a polynomial's terms at eight parts ``c`` of the step: for slopes, and for positions.
+    """Set the weights of a polynomial's terms at eight parts ``c`` of a step: for slopes and positions.
 
     See `integrators.kernel.step.sample.interpolate`, which has the formulas. With s = 1 the mean of the
     second term is no part of a position, which would not arrive at the step's end with it.
