@@ -17,6 +17,13 @@ iterations = Around("step.fused", "iterations", "context count after")
 solver = Engine("implicit.entry", "entry", "ctx memory started")
 """The implicit solver; its address is what `integrators.kernel.step.solver_switch` calls."""
 
+triangular = Engine(
+    "implicit.triangular",
+    "entry",
+    "n lower_starts lower_columns lower upper_starts upper_columns upper sources targets vectors scratch",
+)
+"""Solve with sparse factors; see `integrators.kernel.implicit.triangular`."""
+
 line = Engine("line.entry", "entry", "operation ctx")
 """Line integrals; its address is what the steps call where there is a `Context.line`."""
 

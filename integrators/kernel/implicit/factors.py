@@ -6,12 +6,20 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from integrators.kernel.engines import triangular
+from integrators.kernel.native.memory import aligned
+
 Complex = NDArray[np.complex128]
 
 FACTORIZE, SOLVE = range(2)
 """What is asked of the function at `Factors.address`."""
 
 DENSE = 0.3  # part of the entries that are stored from which a matrix is treated as dense
+
+
+def is_dense(entries: int, n: int) -> bool:
+    """Whether a matrix of n rows with so many entries is factored as a dense one."""
+    return entries > DENSE * n * n
 
 
 class Matrices(Protocol):
@@ -55,8 +63,9 @@ class Factors:
         n = arrays.state.size
         self._size = n
         self._solvers: list[Any] = []
+        self._one_real = len(values) == 1 and values[0].imag == 0.0
         self.error: BaseException | None = None
-        self._dense = rows.size > DENSE * n * n
+        self._dense = is_dense(rows.size, n)
         if not self._dense:
             self._pattern = _Pattern(rows, columns, n)
         self._callback = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)(self._called)
@@ -91,10 +100,17 @@ class Factors:
             matrix = np.eye(self._size, dtype=entries.dtype)
             matrix[self._arrays.entry_rows, self._arrays.entry_columns] += entries
             factors = lu_factor(matrix, overwrite_a=True, check_finite=False)
-            return lambda x: lu_solve(factors, x, check_finite=False)
+            if not self._one_real:
+                return lambda x: lu_solve(factors, x, check_finite=False)
+
+            def solve(x: Any) -> None:
+                x[:] = lu_solve(factors, x, check_finite=False)
+
+            return solve
         from scipy.sparse.linalg import splu
 
-        return splu(self._pattern.matrix(entries), permc_spec=self._pattern.order).solve
+        factors = splu(self._pattern.matrix(entries), permc_spec=self._pattern.order)
+        return Triangular(factors) if self._one_real else factors.solve
 
     def _solve(self, group: int) -> None:
         """Replace eight vectors, real parts and then imaginary parts, by what their matrices make of them."""
@@ -103,9 +119,10 @@ class Factors:
             self._solve_copy(group, *both[:, first : first + n])
 
     def _solve_copy(self, group: int, x: Any, y: Any) -> None:
-        if len(self._solvers) == 1 and self._values[0].imag == 0.0:  # all belong to the one matrix
-            solution = self._solvers[0](np.concatenate([x, y], axis=1))
-            x[:], y[:] = solution[:, :8], solution[:, 8:]
+        if self._one_real:  # all belong to the one matrix
+            for vectors in (x, y):
+                if vectors.any():  # an odd number of groups leaves nothing for the last one's second half
+                    self._solvers[0](vectors)
             return
         for lane, pair in enumerate(range(8 * group, min(8 * group + 8, len(self._solvers)))):
             solve, real = self._solvers[pair], self._values[pair].imag == 0.0
@@ -115,6 +132,33 @@ class Factors:
             else:
                 solution = solve(x[:, lane] + 1j * y[:, lane])
                 x[:, lane], y[:, lane] = solution.real, solution.imag
+
+
+class Triangular:
+    """The sparse factors of a real matrix, which replace eight vectors by the solutions.
+
+    SuperLU's own solution for several vectors calls BLAS, whose threads cost more than they save.
+    """
+
+    def __init__(self, factors: Any) -> None:
+        lower, upper = (part.tocsr() for part in (factors.L, factors.U))
+        for part in (lower, upper):
+            part.sort_indices()
+        n = factors.shape[0]
+        diagonal = upper.indptr[:-1]
+        upper.data[diagonal] = 1.0 / upper.data[diagonal]
+        self._kept = [
+            array.astype(np.int64) if array.dtype.kind == "i" else array
+            for part in (lower, upper)
+            for array in (part.indptr, part.indices, part.data)
+        ]
+        self._kept += [np.argsort(factors.perm_r), factors.perm_c.astype(np.int64), aligned(8 * n)]
+        self._words = [n, *(array.ctypes.data for array in self._kept)]
+
+    def __call__(self, vectors: Any) -> None:
+        """Replace vectors, shape (n, 8), by the solutions."""
+        *words, scratch = self._words
+        triangular(*words, vectors.ctypes.data, scratch)
 
 
 class _Pattern:

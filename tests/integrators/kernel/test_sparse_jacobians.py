@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 import scipy.sparse
 from scipy.integrate import solve_ivp
+from scipy.sparse.linalg import splu
 
 from integrators import HBVM, integrate
+from integrators.kernel.implicit.factors import Triangular
 from integrators.kernel.implicit.groups import groups
+from integrators.kernel.native.memory import aligned
 from problems import InputError, Opaque, Problem, VectorField
 
 N = 100
@@ -94,3 +97,56 @@ def test_a_grid_of_loops_is_solved_with_sparse_factors_like_scipy_solves_it():
         solution = integrate(problem, HBVM(solver=solver), [1.0])
         assert solution.stats.extra["implicit"]["jacobian"] == "traced"
         assert solution.y[-1] == pytest.approx(reference, abs=1e-12)  # measured 1e-13
+
+
+def solved_by_factors(seed):
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(1, 200))
+    matrix = scipy.sparse.random_array((n, n), density=min(1.0, 4 / n), rng=rng, data_sampler=rng.normal)
+    matrix = (matrix + scipy.sparse.diags_array(rng.normal(size=n)).tocsr()[rng.permutation(n)]).tocsc()
+    if np.linalg.cond(matrix.toarray()) > 1e8:
+        return
+    vectors = aligned(8 * n).reshape(n, 8)
+    vectors[:] = rng.normal(size=(n, 8))
+    given = vectors.copy()
+    order = "MMD_AT_PLUS_A" if seed % 2 else "COLAMD"
+    Triangular(splu(matrix, permc_spec=order))(vectors)
+    scale = abs(matrix).max() * abs(vectors).max() + 1.0
+    assert abs(matrix @ vectors - given).max() <= 1e-12 * scale  # measured 1e-14
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_eight_vectors_are_solved_with_sparse_factors(seed):
+    solved_by_factors(seed)
+
+
+@pytest.mark.slow
+def test_eight_vectors_are_solved_with_sparse_factors_of_many_matrices():
+    for seed in range(20, 2000):
+        solved_by_factors(seed)
+
+
+def test_the_default_factors_one_real_matrix_where_the_jacobian_is_sparse():
+    n = 20
+    cell = np.arange(n * n).reshape(n, n)
+    near = [np.roll(cell, shift, axis) for axis in (0, 1) for shift in (1, -1)]
+    stencil = np.stack([cell, *near], axis=-1).reshape(-1, 5)
+
+    def f(y, m):
+        def term(i, *near):
+            return 1000.0 * (sum(y[j] for j in near) - 4 * y[i]) - y[i] ** 3
+
+        return m.each(term, stencil)
+
+    def plain(t, y):
+        w = y.reshape(n, n)
+        around = sum(np.roll(w, shift, axis) for axis in (0, 1) for shift in (1, -1))
+        return (1000.0 * (around - 4 * w) - w**3).ravel()
+
+    start = np.random.default_rng(1).uniform(-1.0, 1.0, n * n)
+    problem = Problem(VectorField(f, dim=n * n), y0=start, t_end=0.5)
+    solution = integrate(problem, HBVM(tol=1e-6), [0.5])
+    assert "blended" in solution.stats.solver
+    assert "Newton" not in solution.stats.solver
+    reference = solve_ivp(plain, (0.0, 0.5), start, method="BDF", rtol=1e-9, atol=1e-12).y[:, -1]
+    assert solution.y[-1] == pytest.approx(reference, abs=1e-8)  # measured 2e-10
