@@ -112,7 +112,7 @@ def solved_by_factors(seed):
     order = "MMD_AT_PLUS_A" if seed % 2 else "COLAMD"
     Triangular(splu(matrix, permc_spec=order))(vectors)
     scale = abs(matrix).max() * abs(vectors).max() + 1.0
-    assert abs(matrix @ vectors - given).max() <= 1e-12 * scale  # measured 1e-14
+    assert abs(matrix @ vectors - given).max() <= 1e-12 * scale  # measured 3e-16
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -149,4 +149,4 @@ def test_the_default_factors_one_real_matrix_where_the_jacobian_is_sparse():
     assert "blended" in solution.stats.solver
     assert "Newton" not in solution.stats.solver
     reference = solve_ivp(plain, (0.0, 0.5), start, method="BDF", rtol=1e-9, atol=1e-12).y[:, -1]
-    assert solution.y[-1] == pytest.approx(reference, abs=1e-8)  # measured 2e-10
+    assert solution.y[-1] == pytest.approx(reference, abs=1e-11)  # measured 7e-14
