@@ -23,7 +23,7 @@ from hbvm_bench.report.document import (
     attempt,
 )
 from hbvm_bench.report.figures.profiles import profiles
-from hbvm_bench.report.page import DRAWN_CASES, Results, block
+from hbvm_bench.report.page import DRAWN_CASES, Results
 from hbvm_bench.report.problem import ProblemPart, part
 from hbvm_bench.report.stored import PLACE
 from hbvm_bench.store.records import Record
@@ -79,7 +79,6 @@ def _parts(results: Results) -> list[ProblemPart]:
 _parts_of: WeakKeyDictionary[Results, list[ProblemPart]] = WeakKeyDictionary()
 
 
-@block
 def goals_reached(results: Results) -> Table | None:
     """Return what the campaigns asked for, and what was measured; ``None`` where they asked for nothing."""
     verdicts = [
@@ -88,21 +87,18 @@ def goals_reached(results: Results) -> Table | None:
     return goals.table(verdicts) if verdicts else None
 
 
-@block
 def times_at_accuracies(results: Results) -> list[Table]:
     """Return the times at several position errors, of each campaign that has any."""
     tables = (accuracies.table(run.index.campaign, run.records) for run in results.runs)
     return [table for table in tables if table is not None]
 
 
-@block
 def best_compilations(results: Results) -> list[Table]:
     """Return the best of several compilations beside their median, for all libraries alike."""
     tables = (compilations.table(run.index.campaign, run.records) for run in results.runs)
     return [table for table in tables if table is not None]
 
 
-@block
 def conditions(results: Results) -> list[Table]:
     """Return how far doubles determine the positions at the ends, where the references say so."""
     rows = []
@@ -123,32 +119,27 @@ def conditions(results: Results) -> list[Table]:
     )
 
 
-@block
 def overview_of_many(results: Results) -> list[Block]:
     """Return what the cases say together, before all else, where there are several problems."""
     return _overall(results, several=True) if len(_parts(results)) > 1 else []
 
 
-@block
 def overview_of_one(results: Results) -> list[Block]:
     """Return the same after the rows where there is one problem."""
     return _overall(results, several=False) if len(_parts(results)) == 1 else []
 
 
-@block
 def problems_in_turn(results: Results) -> list[Section]:
     """Return the section of each problem."""
     return [item.section for item in _parts(results)]
 
 
-@block
 def raw_data(results: Results) -> Section:
     """Return where the rows lie."""
     del results
     return Section("Raw data", [Files(ALL, [PACKED])], "data-files", nav="Data")
 
 
-@block
 def sources(results: Results) -> Section:
     """Return what the problems are from, and how to cite the methods."""
     references = [text for item in _parts(results) for text in item.problem.references]
@@ -174,7 +165,6 @@ def _outcomes(records: Sequence[Record]) -> list[Block]:
     return [*([table] if table else []), *([folded] if reasons else [])]
 
 
-@block
 def what_came_out(results: Results) -> Section:
     """Return the sentences where there are few, and every case as a row."""
     parts, records = _parts(results), results.records
@@ -208,7 +198,6 @@ def what_came_out(results: Results) -> Section:
     return Section("Results", blocks, "results", nav="Results")
 
 
-@block
 def fairness(results: Results) -> Section:
     """Return the rules, the settings of each method, and what was excluded."""
     runs, records = results.runs, results.records
@@ -235,7 +224,6 @@ def fairness(results: Results) -> Section:
     return Section(title, blocks, "fairness", nav="Fairness")
 
 
-@block
 def run_again(results: Results) -> Section:
     """Return the commands, and what was measured with what."""
     runs, records = results.runs, results.records

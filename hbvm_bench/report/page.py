@@ -6,11 +6,13 @@ a Python file beside the campaign's.
 
 import re
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from importlib import import_module
+from inspect import isfunction
 from pathlib import Path
-from typing import TypeVar
+from types import ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,14 +108,6 @@ class Results:
 
 
 BlockMaker = Callable[[Results], Made]
-F = TypeVar("F", bound=BlockMaker)
-_blocks: dict[str, BlockMaker] = {}
-
-
-def block(function: F) -> F:
-    """Let campaign files name a function of results as a block of their page."""
-    _blocks[f"{function.__module__}:{function.__name__}"] = function
-    return function
 
 
 def find(name: str, study: Path | None = None) -> BlockMaker:
@@ -128,18 +122,20 @@ def find(name: str, study: Path | None = None) -> BlockMaker:
         return folder.named(name, study)
     module, _, function = name.rpartition(":")
     place = f"{STUDIES}.{module}" if module else HERE
+    known: dict[str, BlockMaker] = {}
     if re.fullmatch(r"[\w.]+", place):
-        try:
-            import_module(place)
-        except ModuleNotFoundError:
-            raise unknown("block of a page", name, _names()) from None
-    if f"{place}:{function}" not in _blocks:
-        raise unknown("block of a page", name, _names())
-    return _blocks[f"{place}:{function}"]
+        with suppress(ModuleNotFoundError):
+            found = import_module(place)
+            known = {key: item for key, item in vars(found).items() if _is_block(item, found)}
+    if function not in known:
+        prefix = f"{module}:" * bool(module)
+        raise unknown("block of a page", name, [f"{prefix}{key}" for key in known])
+    return known[function]
 
 
-def _names() -> list[str]:
-    return [name.removeprefix(f"{HERE}:").removeprefix(f"{STUDIES}.") for name in _blocks]
+def _is_block(item: object, module: ModuleType) -> bool:
+    """Whether something in a module is one of its own functions for campaigns to name."""
+    return isfunction(item) and item.__module__ == module.__name__ and not item.__name__.startswith("_")
 
 
 def gather(stores: Stores, study: Path | None = None) -> Results:

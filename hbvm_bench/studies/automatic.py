@@ -15,7 +15,7 @@ from hbvm_bench.measure.timing import Spread
 from hbvm_bench.report.document import Block, Note, Section, attempt
 from hbvm_bench.report.figures.canvas import Picture, new, picture, styled
 from hbvm_bench.report.figures.style import INK, MUTED, PAPER, base
-from hbvm_bench.report.page import Results, block
+from hbvm_bench.report.page import Results
 from hbvm_bench.store.records import Record
 from hbvm_bench.store.stored_run import StoredRun
 from hbvm_bench.summaries import compilations, outcomes, standings
@@ -102,7 +102,6 @@ def head_to_heads(run: StoredRun) -> list[HeadToHead]:
 METRICS = ("warm_seconds", "steps", "energy_max", "position_mean")
 
 
-@block
 def errors_are(results: Results) -> Note:
     """Return what a position error is here."""
     del results
@@ -113,14 +112,12 @@ def errors_are(results: Results) -> Note:
     )
 
 
-@block
 def ratios_by_kind(results: Results) -> list[Block]:
     """Return the ratios as a figure and as a table, one column for each kind of processor."""
     drawn = attempt(("the ratios", partial(ratios_drawn, results.by_processor)))
     return [*drawn, ratios(results.by_processor)]
 
 
-@block
 def kinds(results: Results) -> list[Section]:
     """Return the numbers of each kind of processor."""
     return [

@@ -15,7 +15,7 @@ from hbvm_bench.measure.starts import PERTURBATION
 from hbvm_bench.report.document import Note, Section
 from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture, styled
 from hbvm_bench.report.figures.style import MUTED, Look
-from hbvm_bench.report.page import Results, block
+from hbvm_bench.report.page import Results
 from hbvm_bench.report.provenance import again
 from hbvm_bench.store.records import ErrorGrowth
 from hbvm_bench.store.stored_run import StoredRun
@@ -176,7 +176,6 @@ growth: a floor and a power of t are fitted together to the logarithm of the rms
 """
 
 
-@block
 def about(results: Results) -> str:
     """Return what was run."""
     result = measured_last(results)
@@ -187,7 +186,6 @@ def about(results: Results) -> str:
     )
 
 
-@block
 def measured_on(results: Results) -> Note:
     """Return on what machine, and what else it did."""
     run = measured_last(results).run
@@ -202,26 +200,22 @@ def measured_on(results: Results) -> Note:
     )
 
 
-@block
 def errors_and_goals(results: Results) -> list[Table]:
     """Return the tables: the errors with their growth, and the goals."""
     return tables(measured_last(results))
 
 
-@block
 def energy_over_time(results: Results) -> Picture | None:
     """Draw the rms over the initial conditions against time."""
     return over_time(measured_last(results), results.look)
 
 
-@block
 def how(results: Results) -> Note:
     """Return how it is measured."""
     del results
     return Note(METHOD)
 
 
-@block
 def run_again(results: Results) -> Section:
     """Return the command, and what was measured with what."""
     run = measured_last(results).run

@@ -9,7 +9,7 @@ import numpy as np
 from hbvm_bench.measure import machine
 from hbvm_bench.measure.timing import Spread
 from hbvm_bench.report.document import Block, Items, Note, Section
-from hbvm_bench.report.page import Results, block
+from hbvm_bench.report.page import Results
 from hbvm_bench.store.records import Record
 from hbvm_bench.store.stored_run import StoredRun
 from hbvm_bench.summaries import outcomes
@@ -147,7 +147,6 @@ def compiled(measured: Sequence[Pair]) -> Table | None:
     )
 
 
-@block
 def costs(results: Results) -> list[Section]:
     """Return for each kind of processor the table, what did not run, and where it was measured."""
     return [

@@ -10,7 +10,7 @@ from hbvm_bench.measure import machine
 from hbvm_bench.measure.measured import POSITION
 from hbvm_bench.report.document import Details, Items, Note, Section, attempt
 from hbvm_bench.report.figures.style import Look
-from hbvm_bench.report.page import Results, block
+from hbvm_bench.report.page import Results
 from hbvm_bench.report.provenance import again
 from hbvm_bench.studies.race import tables
 from hbvm_bench.studies.race.families import FAMILIES
@@ -72,45 +72,38 @@ def _each(values: Iterable[str]) -> str:
     return " or ".join(dict.fromkeys(values))
 
 
-@block
 def machines(results: Results) -> list[Note]:
     """Return what the times were taken on."""
     races = sorted(races_of(results), key=lambda race: race.started)
     return [Note(said) for said in machine.sentences(race.machine for race in races)]
 
 
-@block
 def overview(results: Results) -> Table:
     """Return the fastest setting on every problem, and all methods relative to it."""
     return tables.overview(races_of(results))
 
 
-@block
 def ratios(results: Results) -> Table:
     """Return the other libraries' best times over those of HBVM and Gauss."""
     return tables.headline(races_of(results))
 
 
-@block
 def kinds(results: Results) -> Table | None:
     """Return the same by the kind of processor, where there are several."""
     races_of = by_kind(results)
     return tables.kinds(races_of) if len(races_of) > 1 else None
 
 
-@block
 def goals(results: Results) -> Table:
     """Return what was asked for before, and what was measured."""
     return tables.goals(races_of(results))
 
 
-@block
 def behind(results: Results) -> Table:
     """Return the settings whose times are compared."""
     return tables.behind(races_of(results))
 
 
-@block
 def contests(results: Results) -> list[Section]:
     """Return the section of each problem."""
     races = races_of(results)
@@ -118,7 +111,6 @@ def contests(results: Results) -> list[Section]:
     return [section(race, results.look, nav) for race, nav in zip(races, navs, strict=True)]
 
 
-@block
 def terms(results: Results) -> Section:
     """Return by what rules they competed."""
     races = races_of(results)
@@ -132,7 +124,6 @@ def terms(results: Results) -> Section:
     return Section("The rules", blocks, "rules", nav="Rules")
 
 
-@block
 def run_again(results: Results) -> Section:
     """Return the commands, and what was measured with what."""
     races = sorted(races_of(results), key=lambda race: race.started)

@@ -7,8 +7,7 @@ from msgspec.structs import replace
 
 from hbvm_bench.campaign.file import Page, load, parse, shipped
 from hbvm_bench.cli import main
-from hbvm_bench.report import markdown, page
-from hbvm_bench.report.document import Note
+from hbvm_bench.report import markdown
 from hbvm_bench.report.page import DEFAULT, document, find
 from hbvm_bench.store.store import Store
 from problems.errors import InputError, UnknownNameError
@@ -62,16 +61,15 @@ def test_a_page_has_the_blocks_that_its_campaign_names_in_this_order(store):
     assert "Fairness" not in text
 
 
-def test_a_new_block_is_one_function(store, monkeypatch):
-    monkeypatch.setattr(page, "_blocks", dict(page._blocks))
-
-    @page.block
-    def how_many(results):
-        return Note(f"{len(results.records)} cases.")
-
-    how_many.__module__ = page.HERE
-    page.block(how_many)
-    assert "3 cases." in markdown.markdown(with_page(store, blocks=["how_many"]))
+def test_a_block_that_is_not_there_is_refused_before_anything_is_measured(tmp_path, capsys):
+    (tmp_path / "blocks.py").write_text("def table(results):\n    return []\n")
+    (tmp_path / "study.toml").write_text(
+        'name = "mine"\nproblems = ["kepler()"]\n[page]\nblocks = ["./blocks.py:tables"]\n'
+        '[[methods]]\nuse = "HBVM()"\n'
+    )
+    assert main(["run", str(tmp_path), "--out", str(tmp_path / "run")]) == 2
+    assert "did you mean 'table'" in capsys.readouterr().err
+    assert not (tmp_path / "run").exists()
 
 
 @pytest.mark.parametrize("name", ["what_came_in", "race.report:ratio", "nosuch:block", "../x:y", "os:system"])
