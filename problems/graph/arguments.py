@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, NoReturn
 
 import numpy as np
+from numpy.typing import NDArray
 
 from problems import limits
 from problems.errors import InputError, shown, unknown
@@ -257,27 +258,30 @@ class Mathematics:
             )
         return condition.choose(a, b)
 
-    def table(self, x: Any, xs: Any, ys: Any, *, extrapolate: bool = False) -> Node:
-        """Return the cubic spline through points, at ``x``; as SciPy's ``CubicSpline(xs, ys)``.
+    def table(self, x: Any, xs: Any, ys: Any, *, kind: str = "cubic", extrapolate: bool = False) -> Node:
+        """Return the interpolant of points, at ``x``.
 
-        An integration beyond the points of a table of the time is refused, unless ``extrapolate``.
+        ``kind``: ``"cubic"``, SciPy's ``CubicSpline(xs, ys)``; ``"linear"``; ``"previous"``, the value of the
+        last point that is not beyond ``x``. An integration beyond the points of a table of the time is
+        refused, unless ``extrapolate``.
         """
-        from scipy.interpolate import CubicSpline  # for those who have tables
-
+        if kind not in _PIECES:
+            known = str(unknown("kind of m.table", kind, _PIECES)).rstrip(".")
+            refuse(known, "leave it out for a cubic spline")
         try:
             xs, ys = (np.asarray(values, dtype=np.float64) for values in (xs, ys))
             if xs.ndim != 1 or ys.ndim != 1:
                 raise ValueError("they are no flat lists")
-            spline = CubicSpline(xs, ys)
+            finite = xs.size == ys.size and bool(np.isfinite([xs, ys]).all())
+            if not finite or xs.size < 2 or (np.diff(xs) <= 0).any():
+                raise ValueError("they are no finite numbers over ascending ones")
+            rows = tuple(map(tuple, _PIECES[kind](xs, ys).tolist()))
         except (TypeError, ValueError) as error:
             refuse(
                 f"m.table cannot use these points ({error})",
                 "give as many finite ys as ascending xs, flat lists",
             )
-        rows = tuple(map(tuple, spline.c.T.tolist()))
-        return self._graph.table(
-            self._graph.node(x), Table(tuple(spline.x.tolist()), rows, bool(extrapolate))
-        )
+        return self._graph.table(self._graph.node(x), Table(tuple(xs.tolist()), rows, bool(extrapolate)))
 
     def __getattr__(self, name: str) -> Callable[[Any], Node]:
         if name.startswith("__"):
@@ -292,6 +296,19 @@ class Mathematics:
         function.__qualname__ = f"m.{name}"  # as Python's messages call it
         return function
 
+
+def _cubic(xs: NDArray[np.float64], ys: NDArray[np.float64]) -> NDArray[np.float64]:
+    from scipy.interpolate import CubicSpline  # for those who have tables
+
+    return CubicSpline(xs, ys).c.T
+
+
+_PIECES: dict[str, Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]] = {
+    "cubic": _cubic,
+    "linear": lambda xs, ys: np.stack([np.diff(ys) / np.diff(xs), ys[:-1]], axis=1),
+    "previous": lambda xs, ys: ys[:, np.newaxis],
+}
+"""Coefficients of a table's pieces, by its kind; see `problems.graph.nodes.Table`."""
 
 OTHERS = ("atan2", "hypot", "min", "max", "where", "table", "sum", "each", "scatter", "dot", "array", "pi")
 """What else a formula finds in m."""

@@ -59,7 +59,8 @@ class Table:
     knots : tuple of float
         Ascending, n >= 2.
     rows : tuple of tuple of float
-        The n - 1 pieces' coefficients in powers of ``x - knots[i]``, highest first.
+        The pieces' coefficients in powers of ``x - knots[i]``, highest first: n - 1 pieces, or n, where
+        another one begins at the last knot.
     extrapolate : bool
         Whether arguments beyond the ends are asked for, see `problems.analysis.tables`.
     """

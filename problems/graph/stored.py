@@ -276,9 +276,9 @@ def _check_table(plain: Any) -> None:
     places = [_number(knot, "a knot of a table") for knot in items(knots, "the knots of a table")]
     if len(places) < 2 or any(a >= b for a, b in pairwise(places)):
         refuse("the knots of a table do not ascend")
-    width = (
-        len(items(rows[0], "a row of a table")) if items(rows, "the rows of a table", len(places) - 1) else 0
-    )
+    if len(items(rows, "the rows of a table")) not in (len(places) - 1, len(places)):
+        refuse("a table has other numbers of rows and knots")
+    width = len(items(rows[0], "a row of a table"))
     if width == 0:
         refuse("a table has rows without coefficients")
     for row in rows:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicSpline, interp1d
 from scipy.special import erf, erfc
 
 import problems
@@ -20,6 +20,7 @@ from problems import Hamiltonian, InputError, Problem, VectorField, targets
 from problems.analysis import structure
 from problems.analysis.switches import Switches
 from problems.double_double import DD
+from problems.evaluate.pairs import evaluate
 from problems.graph.arguments import OTHERS
 from problems.graph.functions import FUNCTIONS
 from problems.targets import latex
@@ -384,6 +385,36 @@ class TestTables:
     def test_other_points_are_refused(self, xs, ys):
         with pytest.raises(InputError, match=r"m\.table cannot use these points"):
             Hamiltonian(lambda q, p, m: p[0] ** 2 / 2 + m.table(q[0], xs, ys), dof=1)
+
+    @pytest.mark.parametrize("kind", ["linear", "previous"])
+    @pytest.mark.parametrize("seed", range(10))
+    def test_other_kinds_have_the_values_and_the_integral_of_scipys(self, kind, seed):
+        rng = np.random.default_rng(seed)
+        xs = np.cumsum(rng.uniform(0.1, 1.0, 8))
+        ys = rng.uniform(-1.0, 1.0, 8)
+        system = VectorField(lambda t, y, m: [m.table(t, xs, ys, kind=kind) - y[0] * 0], dim=1)
+        expected = interp1d(xs, ys, kind=kind)
+        field = targets.numpy(system, "field")
+        for t in (*rng.uniform(xs[0], xs[-1], 5), *xs.tolist()):
+            assert field(t, np.zeros(1), np.empty(0))[0] == pytest.approx(float(expected(t)), abs=1e-14)
+            (value,) = evaluate(system.field, t, np.zeros((1, 1)), np.empty(0))
+            assert value.rounded()[0] == pytest.approx(float(expected(t)), abs=1e-14)
+        problem = pickle.loads(pickle.dumps(Problem(system, y0=[0.0], t0=xs[0], t_end=xs[-1])))
+        solution = integrate(problem, HBVM(), [xs[-1]], sample="steps")
+        widths, means = np.diff(xs), ys[:-1] if kind == "previous" else (ys[1:] + ys[:-1]) / 2
+        assert solution.y[-1, 0] == pytest.approx(float(widths @ means), abs=1e-14)  # measured 5e-16
+        assert set(xs[1:].tolist()) <= set(solution.t.tolist())
+
+    def test_a_previous_value_stays_after_the_last_point(self):
+        system = VectorField(
+            lambda t, m: [m.table(t, [0, 1, 2], [3, 4, 5], kind="previous", extrapolate=True)], dim=1
+        )
+        solution = integrate(Problem(system, y0=[0.0], t_end=4.0), HBVM())
+        assert solution.y[-1, 0] == pytest.approx(3 + 4 + 10, abs=1e-14)  # measured 0
+
+    def test_another_kind_is_refused(self):
+        with pytest.raises(InputError, match=r"unknown kind of m\.table 'linar'; did you mean 'linear'"):
+            VectorField(lambda t, m: [m.table(t, [0, 1], [0, 1], kind="linar")], dim=1)
 
 
 class TestTablesBeyondTheirData:
