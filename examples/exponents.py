@@ -1,6 +1,10 @@
-"""The Lyapunov exponents of Lorenz's system, beside heyoka's variational equations."""
+"""The Lyapunov exponents of Lorenz's system, beside heyoka's variational equations.
+
+And beside pynamicalsys, where it is installed: it is no dependency (``pip install pynamicalsys``).
+"""
 
 from functools import cache
+from importlib.util import find_spec
 
 import heyoka as hy
 import numpy as np
@@ -43,6 +47,32 @@ def by_heyoka() -> np.ndarray:
     return growth / (END - SKIP)
 
 
+@cache
+def pynamicalsyss():
+    """Return the system of pynamicalsys, which compiles a field and its Jacobian by numba."""
+    import numba
+    from pynamicalsys import ContinuousDynamicalSystem
+
+    @numba.njit
+    def field(time, u, parameters):
+        return np.array([10 * (u[1] - u[0]), u[0] * (28 - u[2]) - u[1], u[0] * u[1] - 8 * u[2] / 3])
+
+    @numba.njit
+    def jacobian(time, u, parameters):
+        return np.array([[-10.0, 10.0, 0.0], [28 - u[2], -1.0, -u[0]], [u[1], u[0], -8 / 3]])
+
+    system = ContinuousDynamicalSystem(
+        equations_of_motion=field, jacobian=jacobian, system_dimension=3, number_of_parameters=0
+    )
+    system.integrator("rk45", atol=1e-10, rtol=1e-10)
+    return system
+
+
+def by_pynamicalsys() -> np.ndarray:
+    """Return the exponents by pynamicalsys."""
+    return pynamicalsyss().lyapunov(START, END, transient_time=SKIP, parameters=np.empty(0))
+
+
 def compare() -> Comparison:
     """Compute all three with both; the first one is known, and their sum is the divergence, -41/3."""
     problem = problems.Problem(problems.VectorField(lorenz, dim=3), y0=START, t_end=END)
@@ -53,6 +83,8 @@ def compare() -> Comparison:
 
     made.add("integrators.lyapunov", lambda: integrators.lyapunov(problem, skip=SKIP).exponents, error)
     made.add("heyoka", by_heyoka, error)
+    if find_spec("pynamicalsys"):
+        made.add("pynamicalsys's RK45", by_pynamicalsys, error)
     return made
 
 
