@@ -18,6 +18,7 @@ ALLOWED = 1e-12
 """What a start may violate a constraint by, relative to the size of its terms."""
 SINGULAR = 1e-13
 """Smallest eigenvalue, of the matrix with diagonal 1, of constraints that are independent."""
+ROUNDING = 2.0**-53
 ITERATIONS = 100
 TERMS = ("constraints", "constraint_rates")
 
@@ -128,7 +129,7 @@ class _At:
                 G, by_momentum = self._matrices(at)
                 largest = np.maximum(largest, sizes)
                 error = float(np.max(np.abs(values) / np.where(largest == 0.0, 1.0, largest)))
-                if error >= last and error <= ALLOWED:
+                if error <= ROUNDING or last <= error <= ALLOWED:
                     break
                 last = error
                 if name == TERMS[0]:
