@@ -173,7 +173,7 @@ def shortcomings(records: Sequence[Record]) -> list[str]:
             f"and a position error of {position:.2g} at the end"
             + ("" if observable is None else f", an error of the observable of {observable:.2g}")
             + ("" if angular is None else f", an error of the angular momentum of {angular:.1e}")
-            + "; the paths below show the orbits."
+            + "."
         )
     return shown
 
