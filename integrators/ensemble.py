@@ -11,7 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from integrators import solution
-from integrators.caveats import LOOKED_AT, expected, lost_invariants, of_losses, warnings
+from integrators.caveats import (
+    LOOKED_AT,
+    expected,
+    lost_invariants,
+    of_atol,
+    of_losses,
+    of_tables,
+    warnings,
+)
 from integrators.plain import (
     doubles,
     packed,
@@ -191,16 +199,18 @@ class Solutions(Trajectories):
         """Warnings about each trajectory, as `integrators.Solution.warnings`."""
         problem = self.problem
         caveat, conserved = self.method.caveat(problem), self.method.conserved(problem.system)
-        looked_at = expected(problem.system, conserved)
-        if any(occurrences.after is not None for events in self.events for occurrences in events.values()):
-            looked_at = {}  # the events' actions may change it
-        lost = lost_invariants(
-            problem.system, looked_at, self.starts, self._times, self.y, self.par, self.steps
-        )
+        atol, held = self.method.options(defaults=True).get("atol"), expected(problem.system, conserved)
+        acted = any(hits.after is not None for events in self.events for hits in events.values())
+        lost = [{}] * len(self) if acted else lost_invariants(  # whose actions may change them
+            problem.system, held, self.starts, self._times, self.y, self.par, self.steps
+        )  # fmt: skip
         return [
-            warnings(problem, start, par, end, caveat, self.extra.get(i, {})) + of_losses(losses, conserved)
-            for i, (start, par, end, losses) in enumerate(
-                zip(self.starts, self.par, self.y[:, -1], lost, strict=True)
+            warnings(problem, start, par, y[-1], caveat, self.extra.get(i, {}))
+            + of_atol(problem, atol, start, y)
+            + of_losses(losses, conserved)
+            + of_tables(problem.system, par, t, y, (problem.t0, start))
+            for i, (start, par, t, y, losses) in enumerate(
+                zip(self.starts, self.par, self._times, self.y, lost, strict=True)
             )
         ]
 

@@ -14,7 +14,15 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from integrators.caveats import LOOKED_AT, expected, lost_invariants, of_losses, of_tables, warnings
+from integrators.caveats import (
+    LOOKED_AT,
+    expected,
+    lost_invariants,
+    of_atol,
+    of_losses,
+    of_tables,
+    warnings,
+)
 from integrators.plain import (
     doubles,
     packed,
@@ -27,7 +35,6 @@ from integrators.plain import (
 from integrators.protocol import Array, DoubleDouble, MethodBase, Program, Stats, Status
 from integrators.segments import Segments
 from problems.analysis import deviations, invariants
-from problems.analysis.tables import states_beyond
 from problems.bodies import Elements, elements
 from problems.checks import File, checked_arguments, readable
 from problems.double_double import DD
@@ -364,18 +371,19 @@ class Solution:
         if failure := extra.get("checkpoint"):
             said = (*said, failure)
         acted = any(happened.after is not None for happened in self.events.values())
-        looked_at = not acted and extra.get("sample") != "dense"
-        conserved = self.method.conserved(problem.system) if looked_at else {}
-        lost = lost_invariants(
-            problem.system, expected(problem.system, conserved) if looked_at else {}, problem.y0[None],
-            self.t, self.y[None], problem.par[None], np.array([self.stats.steps]),
+        conserved = self.method.conserved(problem.system)
+        held = {} if extra.get("sample") == "dense" else expected(problem.system, conserved)
+        lost = {} if acted else lost_invariants(
+            problem.system, held, problem.y0[None], self.t, self.y[None], problem.par[None],
+            np.array([self.stats.steps]),
         )[0]  # fmt: skip
         for name, seen in extra.get("losses", {}).items():  # what was seen at checkpoints
             loss = tuple(seen) if len(seen) == 2 else (seen[0], seen[1] / seen[2])  # of version 0.1
             if name not in lost or abs(loss[0] - problem.t0) < abs(lost[name][0] - problem.t0):
                 lost[name] = loss
-        left = states_beyond(problem.system, problem.par, self.t, self.y) if self.t.size else None
-        return said + of_losses(lost, conserved) + of_tables(left)
+        said += of_atol(problem, self.method.options(defaults=True).get("atol"), problem.y0, self.y)
+        said += of_losses(lost, conserved)
+        return said + of_tables(problem.system, problem.par, self.t, self.y, (problem.t0, problem.y0))
 
     def invariants(self) -> dict[str, Array]:
         """Return the problem's invariants along the trajectory, by name, with the parameters of each time."""

@@ -38,6 +38,7 @@ from integrators.refusals import (
 from integrators.running.checkpoints import Identity
 from integrators.running.times import plan
 from integrators.running.watchdog import StallDetector
+from integrators.undefined import where_undefined
 from problems.errors import unknown
 from problems.problem import System
 from problems.systems.opaque import Opaque
@@ -222,9 +223,13 @@ class StepperBase:
         """End with the state ``y``, reached at ``t``; where one of them is not finite, at the present."""
         if math.isfinite(t) and are_finite(y):
             self._arrive(t, y)
-        undefined = undefined_in(self.started[0].system) if self.error is None else None
-        if undefined is not None and status in (Status.NOT_FINITE, Status.STEP_UNDERFLOW):
-            self.error, reason = undefined, f"{reason} There {UserError(undefined)}."
+        if status in (Status.NOT_FINITE, Status.STEP_UNDERFLOW) and self.error is None:
+            program, par = self.started
+            undefined = undefined_in(program.system)
+            if undefined is not None:
+                self.error, reason = undefined, f"{reason} There {UserError(undefined)}."
+            elif place := where_undefined(program.system, self._t, self._y, par):
+                reason = f"{reason.rstrip('.')}; {place}."
         self._status, self._reason = status, reason
 
     def _towards(self, end: float) -> float | None:

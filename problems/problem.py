@@ -39,7 +39,7 @@ class Problem:
     parameters : mapping of str to float or sequence of float
         Values that differ from the system's defaults.
     t0, t_end : float
-        Integration interval; ``t_end`` may lie before ``t0``.
+        Integration interval; ``t_end`` may lie before ``t0``, or be ``t0``, where a solution is the start.
     name : str, optional
         The name for `problems.load`.
     title : str, optional
@@ -124,8 +124,6 @@ class Problem:
             raise InputError(
                 f"project=True is for systems with constraints, unlike {system.name}; leave it out."
             )
-        if t0 == t_end:
-            raise InputError(f"t_end={shown(t_end)} must differ from t0={shown(t0)}.")
         grid = None if times is None else _numbers("times", times, None)
         given = {"q0": q0, "p0": p0, "v0": v0, "y0": y0}
         printed = [f"{key}={_shown(value)}" for key, value in given.items() if value is not None]

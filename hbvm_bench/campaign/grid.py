@@ -90,8 +90,11 @@ class Grid(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
         Raises
         ------
         problems.errors.InputError
-            For more samples than `problems.limits` allow, or ``first`` beyond the interval.
+            For more samples than `problems.limits` allow, ``first`` beyond the interval, or a problem that
+            ends at its start.
         """
+        if problem.t_end == problem.t0:
+            raise InputError(f"{problem} ends at its start, t0={problem.t0!r}: give it a later t_end.")
         times, span = self._shared(problem), problem.t_end - problem.t0
         further = problem.t0 + np.copysign([t for t in self.also if t < abs(span)], span)
         times = np.union1d(times, further)[:: 1 if span > 0.0 else -1] if further.size else times

@@ -147,6 +147,8 @@ def periodic(
     if start.shape != problem.y0.shape or not np.isfinite(start).all():
         raise InputError(f"guess={shown(guess)} must be {problem.system.dim} finite numbers.")
     span = abs(problem.t_end - problem.t0) if period is None else period
+    if span == 0.0:
+        raise InputError(f"the problem ends at its start, t0={problem.t0!r}; give a guess of the period.")
     search = _Search(problem, method, _free(problem, free, mirror), _signs(problem, start, mirror), span)
     point = _Point(start.copy(), span, problem.par.copy())
     reason, iterations, residual, matrix, norm = "", 0, *search.at(point)

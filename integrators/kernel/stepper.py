@@ -57,6 +57,7 @@ from integrators.refusals import check_times, one_thread
 from integrators.running.checkpoints import Identity
 from integrators.running.times import Counts
 from integrators.running.watchdog import StallDetector
+from integrators.undefined import where_undefined
 from problems.errors import InputError, unknown
 from problems.problem import System
 from problems.systems.opaque import Opaque
@@ -661,7 +662,7 @@ class HBVMStepper(ABC):
         if self._vectors is not None and self._vectors.failed:
             return Status.NONLINEAR_DIVERGENCE, (
                 f"the equations of the variations were not solved in the step from t = {self.t!r}, "
-                f"h = {self._context.h!r}; take a smaller h."
+                f"h = {self._context.h!r}; {shorter(self._program)}."
             )
         if outcome == HALTED and self.search is not None:
             if self.search.trouble is not None:
@@ -701,11 +702,15 @@ def failure(
     if outcome == NOT_KEPT and program.kept:
         return Status.NOT_INVARIANT, program.kept.refusal(contexts, t)
     if outcome == NOT_FINITE:
-        return Status.NOT_FINITE, f"the vector field is not finite in the step from t = {t!r}."
+        raises = undefined_in(program.system) is not None  # and is told with what it raised
+        place = "" if raises else where_undefined(program.system, t, ctx.read(), ctx.par, ctx.h)
+        return Status.NOT_FINITE, (
+            f"the vector field is not finite in the step from t = {t!r}{place and f': {place}'}."
+        )
     if outcome == SCATTERED:
         return Status.NONLINEAR_DIVERGENCE, (
             f"the equations of the step from t = {t!r}, h = {ctx.h!r} have no solution near "
-            "the trajectory: the one found oscillates within the step; take a smaller h."
+            f"the trajectory: the one found oscillates within the step; {shorter(program)}."
         )
     best, last = ctx.solver.best, ctx.solver.last
     if best < NOISE_AT_MOST and last < 100.0 * best:
@@ -715,5 +720,10 @@ def failure(
         )
     return Status.NONLINEAR_DIVERGENCE, (
         f"the {solver} iteration did not converge in the step from t = {t!r}, "
-        f"h = {ctx.h!r} (last relative change {ctx.solver.last:.1e}); take a smaller h."
+        f"h = {ctx.h!r} (last relative change {ctx.solver.last:.1e}); {shorter(program)}."
     )
+
+
+def shorter(program: Program) -> str:
+    """Return what makes the steps of a method shorter."""
+    return "give a smaller tol, or max_step" if program.varying else "take a smaller h"

@@ -158,7 +158,7 @@ def advise(problem: Problem, accuracy: Annotated[float, _Accuracy()] = 1e-10) ->
     Raises
     ------
     problems.errors.InputError
-        For an accuracy outside (0, 1), and if `HBVM` fails at the beginning of the problem.
+        For an accuracy outside (0, 1), a problem without an interval, and if `HBVM` fails at its beginning.
 
     Notes
     -----
@@ -176,6 +176,8 @@ def advise(problem: Problem, accuracy: Annotated[float, _Accuracy()] = 1e-10) ->
     True
     """
     check_is_problem(problem)
+    if problem.t_end == problem.t0:
+        raise InputError(f"the problem ends at its start, t0={problem.t0!r}; give it a later t_end.")
     goal = SAFETY * accuracy
     scout = _Scout(problem)
     span = _Part(problem, scout.end, goal)

@@ -188,6 +188,13 @@ class HBVM(MethodBase):
     citation = CITATION
     family = "hbvm"
 
+    def __repr__(self) -> str:
+        """Return the call that makes it, without the tolerance that it has by default."""
+        told = self.options()
+        if self.h is None and self.tol == TOLERANCE:
+            del told["tol"]
+        return f"HBVM({', '.join(f'{name}={value!r}' for name, value in told.items())})"
+
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.h is None and self.tol is None:

@@ -84,8 +84,8 @@ def integrate(
         its order and step size automatically.
     times : array_like, shape (n,), or float, optional
         Output times, strictly monotone from the problem's ``t0`` on (forward or backward). One number is the
-        end of 1001 equidistant times. Default: the problem's ``times``, or else 1001 equidistant times to
-        ``t_end``.
+        end of 1001 equidistant times; where it is ``t0``, the only one. Default: the problem's ``times``, or
+        else its ``t_end`` as one number.
     sample : {"partial", "steps", "stop", "dense"}, optional
         How states between the method's steps are computed; see `Stepper.advance`.
     events : Event or callable, or a sequence of them, optional
@@ -385,14 +385,18 @@ def _with_events(solution: Solution, search: Finder, *, keeps: bool) -> Solution
     end = Ending.from_search(search, solution.status, solution.reason, solution.problem.t0, solution.t_stop)
     n = end.count(solution.t, search)
     t, y = solution.t[:n], solution.y[:n]
-    if keeps and not n and end.status is Status.EVENT and solution.variations is None:
+    vectors = None if solution.variations is None else solution.variations[:n]
+    if keeps and not n and end.status is Status.EVENT:
         stop, last = search.hits.last()
         t, y = np.array([stop]), last[np.newaxis]
+        if vectors is not None:
+            ended = replace(solution, t=solution.t[:0], y=solution.y[:0], variations=vectors, t_stop=stop)
+            vectors = ended.variations_at(t)
     stats = replace(solution.stats, extra={**solution.stats.extra, "event_search": search.work()})
     return replace(
         solution, t=t, y=y, status=end.status, reason=end.reason, t_stop=end.stop,
         stats=stats, events=search.hits.occurrences(), error=end.error or solution.error,
-        variations=None if solution.variations is None else solution.variations[:n],
+        variations=vectors,
     )  # fmt: skip
 
 
@@ -402,10 +406,8 @@ def _grid(problem: Problem, times: ArrayLike | None) -> Array:
         times = problem.times
     grid = plain_numbers("times", problem.t_end if times is None else times)
     if grid.ndim == 0:
-        if not isfinite(grid) or grid == problem.t0:
-            raise InputError(
-                f"times={shown(times)} is no end for a start at t0={problem.t0!r}; give a later time."
-            )
+        if not isfinite(grid):
+            raise InputError(f"times={shown(times)} is no end; give a finite time.")
         grid = _equidistant(problem.t0, float(grid))
     size = grid.size * problem.system.dim
     if size > UNLIMITED:
@@ -417,4 +419,4 @@ def _grid(problem: Problem, times: ArrayLike | None) -> Array:
 
 @lru_cache(maxsize=64)
 def _equidistant(t0: float, end: float) -> Array:
-    return np.linspace(t0, end, DEFAULT_SAMPLES)
+    return np.linspace(t0, end, 1 if end == t0 else DEFAULT_SAMPLES)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from integrators import registry
+from integrators.caveats import of_tables, warnings
 from integrators.events.event import Event
 from integrators.protocol import (
     Array,
@@ -24,6 +25,7 @@ from integrators.running.digits import as_pairs, check_digits, pairs
 from integrators.running.integrate import prepared, started, wanted_events
 from integrators.solution import Occurrences, as_mpmath
 from problems.analysis import invariants
+from problems.analysis.tables import check_tables
 from problems.checks import checked_arguments
 from problems.errors import InputError
 from problems.problem import Problem
@@ -298,6 +300,13 @@ class Run:
         return self._stepper.reason if trouble is None else trouble[1]
 
     @property
+    def warnings(self) -> tuple[str, ...]:
+        """Warnings about the integration so far, as those of a `Solution`, and about the present state."""
+        problem, par, y = self.problem, self._now, self.y
+        said = warnings(problem, problem.y0, par, y, self.method.caveat(problem), self._stepper.stats.extra)
+        return said + of_tables(problem.system, par, np.array([self.t]), np.asarray(y)[np.newaxis])
+
+    @property
     def events(self) -> dict[str, Occurrences]:
         """Occurrences of the events so far, by name."""
         if not self._wanted:
@@ -350,9 +359,10 @@ class Run:
         Raises
         ------
         problems.errors.InputError
-            If ``t`` is not a finite number.
+            If ``t`` is not a finite number, or a table of the time has no data up to there.
         """
         (goal,) = check_times([t], self.t).tolist()
+        check_tables(self.problem.system, self._now, self.t, goal)
         if self.status is Status.RUNNING and goal != self.t:
             if (goal - (self.t if self._wanted else self._stepper.t)) * self._way < 0.0:
                 if self._wanted:

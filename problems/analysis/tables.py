@@ -1,14 +1,19 @@
-"""Tables of the time that end before the integration does."""
+"""Tables whose data end before the integration does, or before the states that it reaches."""
+
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from problems.analysis.switches import affine_pieces
-from problems.derive.function import function_of
 from problems.errors import InputError
-from problems.evaluate.pairs import evaluate
-from problems.graph.nodes import STATE, T, reachable
+from problems.evaluate.doubles import DOUBLES
+from problems.evaluate.evaluator import Evaluator
+from problems.graph.nodes import STATE, Node, T, reachable
 from problems.systems.base import System
+
+Beyond = tuple[float, float, float, float]
+"""A time, the argument of a table there, and the ends of its data."""
 
 _ROUNDING = 2.0**-48  # of the largest knot: so far an argument that is calculated may be beyond the last one
 
@@ -25,11 +30,7 @@ def check_tables(system: System, par: NDArray[np.float64], t0: float, t1: float)
         With the interval of the table and that of its argument.
     """
     nodes = reachable(system.field.roots) if system.field is not None else []
-    tables = [
-        node
-        for node in nodes
-        if node.op == "table" and not node.data.extrapolate and node.args[0].flags & (T | STATE) == T
-    ]
+    tables = [node for node in nodes if _ends(node) and node.args[0].flags & (T | STATE) == T]
     for node in tables:
         pieces = affine_pieces(node.args[0], par)
         if pieces is None or len(pieces) != 1:
@@ -48,41 +49,51 @@ def check_tables(system: System, par: NDArray[np.float64], t0: float, t1: float)
 
 def states_beyond(
     system: System, par: NDArray[np.float64], t: NDArray[np.float64], y: NDArray[np.float64]
-) -> tuple[float, float, float, float] | None:
-    """Return the first of some states at which a table of the state has no data.
+) -> list[Beyond | None]:
+    """Return at which states a table has no data; ``None`` for the others.
 
     Parameters
     ----------
     system : System
-        Whose field is looked at; tables inside of loops are not.
+        Whose field is looked at.
     par : ndarray, shape (n_par,) or (n_par, n)
         Parameters.
     t, y : ndarray, shapes (n,), (n, dim)
-        Times and states.
+        Times and states; those that are not finite are not looked at.
 
     Returns
     -------
-    tuple of float or None
-        Its time, the argument there, and the ends of the data.
+    list of tuple
+        For each state its time, the argument there, and the ends of the data.
     """
-    nodes = reachable(system.field.roots) if system.field is not None else []
-    tables = [
-        node
-        for node in nodes
-        if node.op == "table"
-        and not node.data.extrapolate
-        and node.args[0].flags & STATE
-        and node.args[0].loop is None
-    ]
-    if not tables:
-        return None
-    arguments = function_of(tables[0].graph, [node.args[0] for node in tables])
-    found = []
-    for node, values in zip(tables, evaluate(arguments, t, np.ascontiguousarray(y.T), par), strict=True):
-        first, last = node.data.knots[0], node.data.knots[-1]
-        x = values.rounded()
-        outside = np.flatnonzero((x < first) | (x > last))
-        if outside.size:
-            i = int(outside[0])
-            found.append((float(t[i]), float(x[i]), first, last))
-    return min(found, default=None)
+    n = len(t)
+    if system.field is None or not any(_ends(node) for node in reachable(system.field.roots)):
+        return [None] * n
+    looks = _Looks(DOUBLES, t[np.newaxis], y.T, par if par.ndim == 2 else par[:, np.newaxis], n)
+    looks.outputs(system.field)
+    finite = np.logical_and.reduce(np.isfinite(y), axis=1)
+    return [(float(t[i]), *looks.found[i]) if finite[i] and i in looks.found else None for i in range(n)]
+
+
+def _ends(node: Node) -> bool:
+    return node.op == "table" and not node.data.extrapolate
+
+
+class _Looks(Evaluator):
+    """Evaluates a field and records the arguments at which tables have no data, by the state's number."""
+
+    def __init__(self, *given: Any) -> None:
+        super().__init__(*given)
+        self.found: dict[int, tuple[float, float, float]] = {}
+
+    def visit_operation(self, node: Node, *args: Any) -> Any:
+        if _ends(node):
+            first, last = node.data.knots[0], node.data.knots[-1]
+            room = _ROUNDING * max(abs(first), abs(last))
+            x = np.asarray(args[0], dtype=np.float64)
+            outside = np.asarray((x < first - room) | (x > last + room))
+            if outside.any():
+                x, outside = (np.broadcast_to(a, (*x.shape[:-1], self._n)) for a in (x, outside))
+                for *term, i in np.argwhere(outside).tolist():
+                    self.found.setdefault(i, (float(x[(*term, i)]), first, last))
+        return super().visit_operation(node, *args)

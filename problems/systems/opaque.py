@@ -2,6 +2,7 @@
 
 import inspect
 import threading
+import warnings
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any
 
@@ -18,6 +19,7 @@ Array = NDArray[np.float64]
 
 _UNWRITTEN = np.array(0x7FF8_0000_5EED_0001).view(np.float64)  # a NaN that no arithmetic makes
 UNDEFINED = (ArithmeticError, ValueError)  # 1/0, math.sqrt(-1): not a number, as in compiled code
+SPLIT = "split the state into real and imaginary parts, as in y0=[*z.real, *z.imag]"
 
 
 class _Undefined(threading.local):
@@ -96,7 +98,7 @@ class Opaque(System):
         self._trace_declared(invariants, guards)
 
     def _take(self, f: Callable[..., Any]) -> None:
-        self.f = f
+        self.f, self._called = f, False
         self.takes_parameters, self.in_place = _form(f)
         self.numba = hasattr(f, "py_func") and hasattr(f, "inspect_llvm")
 
@@ -150,18 +152,24 @@ class Opaque(System):
         Raises
         ------
         problems.errors.InputError
-            If f does not return dim numbers.
+            If f does not return dim numbers, writes complex ones, or cannot be compiled.
         """
         arguments = (t, y, par) if self.takes_parameters else (t, y)
         try:
             if self.in_place:
                 out[:] = _UNWRITTEN
                 arguments += (out,)
-            value = self.f(*arguments)
+            value = self.f(*arguments) if self._called else self._first_call(arguments)
+        except InputError:  # which is a ValueError
+            raise
         except UNDEFINED as error:
             _last.system, _last.error = self, error.with_traceback(None)  # whose frames hold the arrays
             out[:] = np.nan
             return
+        except TypeError as error:
+            if self.in_place and "complex" in str(error):  # NumPy's own, of dy[0] = 1j
+                raise self._complex() from error
+            raise
         if self.in_place:
             self._check_written(out, value)
             return
@@ -172,6 +180,37 @@ class Opaque(System):
                 "one derivative for each component of y."
             )
         out[:] = array
+
+    def _first_call(self, arguments: tuple[Any, ...]) -> Any:
+        """Call f, where NumPy must not drop an imaginary part and numba compiles it."""
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("error", np.exceptions.ComplexWarning)
+                value = self.f(*arguments)
+        except np.exceptions.ComplexWarning as error:
+            raise self._complex() from error
+        except Exception as error:
+            if self.numba and (refused := self.not_compiled(error)) is not None:
+                raise refused from error
+            raise
+        self._called = True
+        return value
+
+    def _complex(self) -> InputError:
+        return InputError(f"{self.name} writes complex numbers to dy, which is real; {SPLIT}.")
+
+    def not_compiled(self, error: Exception) -> InputError | None:
+        """Return why numba does not compile f, in a sentence; ``None`` for an error of another kind."""
+        import numba.core.errors  # has been imported by who compiled f
+
+        if not isinstance(error, numba.core.errors.NumbaError):
+            return None
+        said = str(error)
+        if "complex128" in said:
+            return InputError(f"{self.name} calculates with complex numbers; {SPLIT}.")
+        told = [line.strip() for line in said.splitlines() if line.strip()]
+        told = [line for line in told if not line.startswith("Failed in nopython mode")] or told
+        return InputError(f"numba does not compile {self.name} for arrays of doubles: {told[0]:.200}")
 
     def _check_written(self, out: Array, value: Any) -> None:
         """Refuse a result of which components were not written: they are not the field's own NaN."""

@@ -125,3 +125,56 @@ def test_ratios_of_the_page_of_headline_ratios_stand_in_the_reports():
     for part in sections:
         (name,) = set(LINK.findall(part))
         assert [ratio for ratio in re.findall(r"\d+\.\d+×", part) if ratio not in report(name)] == [], name
+
+
+def test_the_first_page_is_read_in_five_minutes():
+    text = re.sub(
+        r"^```.*?^```", "", (pages.ROOT / "README.md").read_text(encoding="utf-8"), flags=re.M | re.S
+    )
+    assert len(re.findall(r"\S*\w\S*", text)) <= 900
+
+
+AUTOMATIC = {
+    "Outer Solar System": "outer_solar_system",
+    "Sitnikov's problem": "sitnikov",
+    "Kepler's problem, e = 0.6": "kepler(e=0.6",
+    "Hénon–Heiles": "henon_heiles",
+    "Restricted three-body problem (less accurate)": "cr3bp",
+}
+LOST = {
+    "ten decays in a row (C1)": ("general", "by position error", "(C1) | 1e-12", "Taylor"),
+    "ten decays in a row, faster and faster (C2)": ("general", "by position error", "(C2) | 1e-12", "Taylor"),
+    "heat equation, 10 points (C3)": ("general", "by position error", "(C3) | 1e-12", "Taylor"),
+    "heat equation, 51 points (C4)": ("general", "by position error", "(C4) | 1e-12", "Taylor"),
+    "outer Solar System": ("race", "At other accuracies", "1e-08, 1e-05 | Gauss", WHFAST),
+}
+
+
+def cells_of_the_first_page(name):
+    """Return the cells behind a name in the first table that has it."""
+    text = (pages.ROOT / "README.md").read_text(encoding="utf-8")
+    row = re.search(rf"^\| {re.escape(name)} \|(.*)\|$", text, re.MULTILINE)
+    assert row is not None
+    return [cell.strip() for cell in row[1].split("|")]
+
+
+@pytest.mark.parametrize("name", AUTOMATIC)
+def test_the_row_of_the_default_is_that_of_its_report(name):
+    columns = ("znver5-512bit", "znver5-512bit-avx2")
+    stored = [Stored()("automatic", "against", AUTOMATIC[name], column) for column in columns]
+    assert cells_of_the_first_page(name) == stored
+    reports = [
+        row for row in report("automatic").splitlines() if AUTOMATIC[name] in row and "against" not in row
+    ]
+    assert ("less accurate" in name) == any("less accurate" in row for row in reports[:2])
+
+
+@pytest.mark.parametrize("name", LOST)
+def test_a_row_of_losses_is_that_of_its_report(name):
+    assert cells_of_the_first_page(name)[-1] == Stored()(*LOST[name])
+
+
+def test_the_animation_is_light():
+    picture = pages.DOCS / "pictures" / "sitnikov.svg"
+    assert picture.stat().st_size < 300_000
+    assert picture.read_text(encoding="utf-8").count("<animate ") == 6

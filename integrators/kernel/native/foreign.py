@@ -29,9 +29,8 @@ def field_of(system: System, quantity: targets.Quantity, lanes: int) -> binary.N
     Raises
     ------
     problems.errors.InputError
-        For another function than the field of a system that is not traced.
-    numba.NumbaError
-        If a numba function cannot be compiled for arrays of numbers.
+        For another function than the field of a system that is not traced, and a numba function that
+        cannot be compiled for arrays of numbers.
     """
     if not isinstance(system, Opaque) or quantity != "field":
         return compile_field(system, quantity, lanes)
@@ -107,7 +106,10 @@ def _compiled(system: Opaque, lanes: int) -> tuple[int, Any]:
                 out[d, l] = dy[d]
 
     pointer = types.CPointer(types.float64)
-    function = numba.cfunc(types.void(pointer, pointer, pointer, pointer))(field)
+    try:
+        function = numba.cfunc(types.void(pointer, pointer, pointer, pointer))(field)
+    except numba.NumbaError as error:
+        raise (system.not_compiled(error) or error) from error
     address: Any = function.address
     return address, function
 
