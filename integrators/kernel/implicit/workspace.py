@@ -106,8 +106,8 @@ class Workspace(Corrections):
         Of the context.
     kind : {NEWTON, BLENDED} or None
         How corrections are computed; beyond some degree they are blended. ``None``: blended with a sparse
-        Jacobian, whose one real matrix is factored in a tenth of the time that the complex ones of Newton's
-        iteration take, but for the second-order form, where the blended iteration converges slowly.
+        Jacobian, whose one real matrix is factored much faster than the complex ones of Newton's
+        iteration, but for the second-order form, where the blended iteration converges slowly.
     linearization : Linearization
         The Jacobian, of R / copies rows.
     copies : int
