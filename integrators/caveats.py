@@ -26,7 +26,7 @@ Measured on the 24 problems of the catalogue that arrive, to t = 300, with ``HBV
 LOST_BY_ANY = 0.1
 """The same for what a method does not conserve: an invariant that has changed so much is lost.
 
-What is as large as this is no matter of accuracy; a method that conserves nothing may drift below it without a
+What is as large is no matter of accuracy; below it a method that conserves nothing may drift without a
 warning. ``tests/faults/test_lost_invariants.py`` looks for false warnings.
 """
 

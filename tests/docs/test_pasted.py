@@ -12,7 +12,7 @@ from tests.docs import pages
 
 BLOCK = re.compile(r"^```python\n(.*?)^```[ \t]*$|" + pages.CELL.pattern, re.MULTILINE | re.DOTALL)
 PASTED = [page for page in pages.sources() if BLOCK.search(page.read_text(encoding="utf-8"))]
-QUICK = ("README.md", "general.md", "solutions.md", "campaigns.md", "problems.md")
+QUICK = ("README.md", "general.md", "solutions.md")
 PEERS = ("heyoka", "rebound", "diffrax", "jax", "torch")
 
 
