@@ -39,7 +39,7 @@ Measured there with ``HBVM(k=8, s=7, tol=1e-12)``: at most 0.1.
 FEW_DIGITS = 1e-12
 """Part of its terms that a line integral may lose before that is told.
 
-Near a singular position of a linkage rounding is amplified: of 70 random ones, 4e-14 of the terms was lost at most.
+Near a singular position of a linkage rounding is amplified: 70 random ones lost 4e-14 of the terms at most.
 """
 
 LOOKED_AT = 2000  # states of a solution, or of all of an ensemble, at which conserved quantities are compared
