@@ -25,7 +25,10 @@ def plain_numbers(label: str, value: ArrayLike) -> NDArray[np.float64]:
     problems.errors.InputError
         For what is not made of numbers, or of more than numbers.
     """
-    refuse_more_than_numbers(label, value)
+    if type(value) is np.ndarray and value.dtype == np.float64:
+        return value
+    if (why := _more(value)) is not None:
+        raise InputError(f"{label} {why}.")
     try:
         return np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
@@ -49,6 +52,8 @@ def _more(value: Any) -> str | None:
     kind = type(value)
     if kind in _PLAIN or (kind is np.ndarray and value.dtype == np.float64):
         return None
+    if kind in (list, tuple) and {*map(type, value)} <= _PLAIN:
+        return None
     if named := next((name for name in ("unit", "units") if hasattr(kind, name)), None):
         return (
             f"has the unit {getattr(value, named)!s:.40}, and units are not carried; give numbers in one "
@@ -69,7 +74,7 @@ def _more(value: Any) -> str | None:
         )
     if isinstance(value, bool | np.bool_) or _kind(value) == "b":
         return "has True or False, and must be numbers; give 1.0 or 0.0"
-    if isinstance(value, list | tuple) and not {*map(type, value)} <= _PLAIN:
+    if isinstance(value, list | tuple):
         return next((why for item in value if (why := _more(item)) is not None), None)
     return None
 

@@ -28,10 +28,11 @@ class Breakpoints:
 
     def __init__(self, given: Array, switches: Switches, par: Array):
         self._given, self._switches, self._par = given, switches, par.copy()
-        self.any = bool(given.size) or switches.any
+        some = switches.any
+        self.any = some or bool(given.size)
         self._points = np.empty(0)
         self._all = given  # with the switches that are known
-        self._low, self._high = (math.nan, math.nan) if switches.any else (-math.inf, math.inf)
+        self._low, self._high = (math.nan, math.nan) if some else (-math.inf, math.inf)
         self._span, self._longest = 0.0, math.inf
 
     def moved_by(self, par: Array) -> bool:

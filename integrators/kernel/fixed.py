@@ -2,6 +2,7 @@
 
 import math
 from time import perf_counter
+from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -89,7 +90,7 @@ class FixedStepper(HBVMStepper):
                 outcome = BUDGET
                 break
             piece = grid[done : done + size]
-            bases = np.full(piece.size, ctx.t0)
+            bases = np.zeros(piece.size) + ctx.t0
             if between == STOP:
                 bases[1:] = piece[:-1]
             steps, parts = plan(piece, bases, ctx.h)
@@ -160,11 +161,15 @@ class FixedStepper(HBVMStepper):
             t: Array = np.asarray(ctx.t0 + targets * ctx.h, dtype=np.float64)
             parts = np.zeros(targets.size)
             between, at = PARTIAL, t
-            if end is not None and ctx.events.act and last_part and last == final:
-                # What is left of the time is looked at for events that change the state; the sample is none.
-                between, at = DENSE, np.append(t, end)
+            # What is left of the time is looked at for events that change the state; the sample is none.
+            rest = end is not None and bool(ctx.events.act and last_part and last == final)
+            shorter = rest and self._passes_end(last + 1)
+            if rest and not shorter:
+                between, at = DENSE, np.append(t, cast("float", end))
                 targets, parts = np.append(targets, last), np.append(parts, last_part)
             new, outcome, reason = self._fill(between, at, targets, parts)
+            if shorter and outcome == DONE and reason is None:
+                outcome, reason = self._look_at_rest(cast("float", end))
             times.append(t[: len(new)])
             states.append(new[: t.size])
             most -= len(states[-1])
@@ -182,6 +187,16 @@ class FixedStepper(HBVMStepper):
     def _first_piece(self) -> int:
         """How many samples or steps are planned at first: few where an event may change the plan."""
         return FEW if self._context.events.act else MOST
+
+    def _look_at_rest(self, end: float) -> tuple[int, Ended | None]:
+        """Look for events that change the state in a step to the end, which stays ahead if there is none."""
+        h = self._context.h
+        self._count_from_here(end - self.t)
+        part = np.array([self._context.h])
+        _, outcome, reason = self._fill(DENSE, np.array([end]), np.zeros(1, dtype=np.int64), part)
+        if outcome == ANEW:
+            self._set_step(h)
+        return outcome, reason
 
     def _turn(self, t0: float) -> None:
         """Reverse the direction, here, at time ``t0``; what lay ahead lies behind and is forgotten."""

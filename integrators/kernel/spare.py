@@ -1,6 +1,7 @@
 """The memory of trajectories that are over, for the next ones of the same program."""
 
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any
 
 from integrators.kernel.context import Context
@@ -16,6 +17,8 @@ BYTES = 1 << 18
 
 BYTES_OF_VECTORS = 1 << 20
 """In the tangent vectors of a pair that is spare, at most."""
+
+_SOLVERS = attrgetter("solvers")
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +62,7 @@ class Pair:
 
     def leave_solvers(self) -> None:
         """Forget vectors that have implicit solvers, whose memory is larger than theirs."""
-        if any(vectors.solvers for vectors in self._vectors.values()):
+        if any(map(_SOLVERS, self._vectors.values())):
             self._vectors = {}
 
     def keep(self, par: bytes) -> None:

@@ -593,7 +593,8 @@ class HBVMStepper(ABC):
         targets: int = 0, parts: int = 0, /,
     ) -> int:  # fmt: skip
         """Call the kernel once; put the implicit solver to work where it is wanted."""
-        self._provide_solver()
+        if self._context.implicit.wanted != NOT_WANTED:
+            self._provide_solver()
         with self._pace:
             outcome = self._enter(
                 steps.prepared(
@@ -604,13 +605,12 @@ class HBVMStepper(ABC):
         return self._handled(outcome)
 
     def _provide_solver(self) -> None:
-        """Put the implicit solver to work where it is wanted."""
-        if self._wants_solver:
-            if self._context.implicit.wanted == FOR_VECTORS:
-                self._make_implicit()
-                self._context.implicit.wanted = NOT_WANTED
-            else:
-                self._take_implicit()
+        """Put the implicit solver to work, which is wanted."""
+        if self._context.implicit.wanted == FOR_VECTORS:
+            self._make_implicit()
+            self._context.implicit.wanted = NOT_WANTED
+        else:
+            self._take_implicit()
 
     def _enter(self, call: Callable[[], int]) -> int:
         """Return how the kernel came back."""

@@ -71,7 +71,8 @@ class AdaptiveStepper(HBVMStepper):
 
     def _begin_at_breakpoint(self) -> None:
         """Let the step ahead begin with the values beyond a breakpoint, if one is here."""
-        if any(map(self._is_at, self._breakpoints.around(self.t, self._expected_way()))):
+        here = self.t
+        if any(self._is_at(point, here) for point in self._breakpoints.around(here, self._expected_way())):
             self._context.discontinuities.boundary = START
 
     def _extra(self) -> dict[str, Any]:
@@ -87,7 +88,7 @@ class AdaptiveStepper(HBVMStepper):
         if (
             self._breakpoints.any
             or self._max_steps is not None
-            or (math.isfinite(stop) and self._is_at(stop))
+            or (math.isfinite(stop) and self._is_at(stop, self.t))
         ):
             return False
         ends, call, _ = self._for_one_step
@@ -117,16 +118,16 @@ class AdaptiveStepper(HBVMStepper):
     def _stop(self) -> float:
         """Return the next breakpoint ahead, or infinity, and have no step pass it or the end."""
         controller, points, end = self._context.controller.numbers, self._breakpoints, self.destination
-        sign = 1.0 if controller.next_length > 0.0 else -1.0
+        sign, here = 1.0 if controller.next_length > 0.0 else -1.0, self.t
         infinity = stop = sign * math.inf
-        if end is None or (end - self.t) * sign <= 0.0 or self._is_at(end):
+        if end is None or (end - here) * sign <= 0.0 or self._is_at(end, here):
             end = infinity
         if self._begins:  # how far it is to go is known now, and with it where to look
             self._begins = False
             self._begin_at_breakpoint()
         if points.any:
-            ahead = points.ahead(self.t, end, self._expected_way())
-            stop = next((point for point in ahead if not self._is_at(point)), infinity)
+            ahead = points.ahead(here, end, self._expected_way())
+            stop = next((point for point in ahead if not self._is_at(point, here)), infinity)
         breaks = math.isfinite(stop)
         if (end - stop) * sign < 0.0:
             controller.stop, controller.breaks = end, 0
@@ -139,11 +140,11 @@ class AdaptiveStepper(HBVMStepper):
         ahead = math.copysign(1.0, self._context.controller.next_length)
         return ahead * max(ahead * (self._goal - self.t), abs(self._context.controller.next_length)) or ahead
 
-    def _is_at(self, t: float) -> bool:
-        """Whether a breakpoint is reached; as `integrators.kernel.step.vary.remaining`."""
+    def _is_at(self, t: float, here: float) -> bool:
+        """Whether a time is reached at the present, ``here``; as `integrators.kernel.step.vary.remaining`."""
         ctx = self._context
-        time_left = (t - self.t) - ctx.time_low
-        return abs(time_left) <= SHORTEST * max(abs(t), abs(self.t), abs(ctx.controller.previous_length))
+        time_left = (t - here) - ctx.time_low
+        return abs(time_left) <= SHORTEST * max(abs(t), abs(here), abs(ctx.controller.previous_length))
 
     def _renew(self, par: Array) -> None:
         super()._renew(par)
@@ -178,7 +179,8 @@ class AdaptiveStepper(HBVMStepper):
                 controller.interval, abs(self._goal - self._origin), abs(end - self._origin)
             )
             self._program.limit(ctx, controller.interval)
-        way = (self._goal if end == self.t else end) - self.t
+        here = self.t
+        way = (self._goal if end == here else end) - here
         if way == 0.0 or not math.copysign(1.0, way) * ctx.controller.next_length < 0.0:
             return
         ctx.controller.next_length *= -1.0
@@ -384,7 +386,7 @@ class AdaptiveStepper(HBVMStepper):
             count = self._context.samples_written
             steps += count
             pieces.append((times[:count], out[:count]))
-            if math.isfinite(stop) and self._is_at(stop):
+            if math.isfinite(stop) and self._is_at(stop, self.t):
                 if outcome == DONE and stop != end:
                     outcome = BUDGET
                 times[count - 1 : count] = stop

@@ -164,30 +164,33 @@ class CVODEStepper(StepperBase):
         self._program, self._par = program, par
         self._solver = program.solver(par)
         self._sign = self._evaluated = 0
+        self._begun = False  # to step, as is not done by `_whole`
         self._tn, self._yn = t, y  # the last of its steps, which may be ahead of the present
 
     def _towards(self, end: float) -> float:
         """Return the sign of the direction to ``end``, with a solver that goes that way."""
         sign = 1 if end > self._t else -1
-        if self._sign != sign:
+        if self._sign != sign or not self._begun:
             self._begin()
             self._sign = sign
         return float(sign)
 
     def _begin(self) -> None:
+        self._begun = True
         self._tn, self._yn = self._t, self._y
         self._evaluated = self._stats.evaluations or 0
         self._solver.init_step(self._t, self._y)
 
     def _serve(self, grid: Array, how: str) -> tuple[Array, Array]:
         end = float(grid[-1])
-        if how == "stop" and grid.size == 1 and not self._sign:
+        alone = grid.size == 1 and self.destination in (None, end)
+        if how == "stop" and alone and not self._begun:
             return self._whole(end)
         sign, watch = self._towards(end), stall_detector(self, self._tn, end)
         states = np.empty((grid.size, self._y.size))
         for i, t in enumerate(grid.tolist()):
             while sign * (self._tn - t) < 0.0:
-                if not self._step(watch, t if how == "stop" else None):
+                if not self._step(watch, t if how == "stop" else self._bound()):
                     return grid[:i], states[:i]
             states[i] = self._yn if self._tn == t else self._solver.step(t, "normal").y
         return grid, states
@@ -211,7 +214,9 @@ class CVODEStepper(StepperBase):
     def _step_states(self, end: float) -> tuple[Array, Array]:
         sign, watch = self._towards(end), stall_detector(self, self._tn, end)
         times, states = [self._t], [self._y]
-        while self._tn != times[-1] or self._step(watch):
+        while self._tn != times[-1] or (
+            sign * (self._tn - end) < 0.0 and self._step(watch, self._bound())
+        ):
             if sign * (self._tn - end) > 0.0:
                 break
             times.append(self._tn)
@@ -224,6 +229,11 @@ class CVODEStepper(StepperBase):
             return None
         return self._tn, self._yn
 
+    def _bound(self) -> float | None:
+        """Return the end of the whole integration, if that is ahead: no step passes it."""
+        end = self.destination
+        return None if end is None or self._sign * (end - self._tn) <= 0.0 else end
+
     @staticmethod
     def _far(t: float) -> float:
         """Return how far CVODE is told to go: its first step depends on that, and must not on samples."""
@@ -232,7 +242,9 @@ class CVODEStepper(StepperBase):
     def _step(self, watch: StallDetector, stop: float | None = None) -> bool:
         """Take one step, not beyond ``stop``; return whether it succeeded."""
         before = self._tn
-        end = before + self._sign * self._far(before) if stop is None else stop
+        end = before + self._sign * self._far(before)
+        if stop is not None and self._sign * (end - stop) > 0.0:
+            end = stop
         try:
             # After a time within a step CVODE returns that step once more.
             result = self._solver.step(end, "onestep", stop)

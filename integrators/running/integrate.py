@@ -210,10 +210,13 @@ def integrate(
         stepper.time_limit, length = SOON, np.inf
     try:
         while done < grid.size and status is Status.FINISHED:
-            piece, how, count = _next_piece(grid, done, here, length, sample, by_steps)
+            piece, how, count = grid[done:], sample, grid.size - done
+            if length < np.inf:
+                piece, how, count = _next_piece(grid, done, here, length, sample, by_steps)
             began = perf_counter()
             samples = stepper.advance(piece, sample=how)
-            length *= _growth(perf_counter() - began)
+            if length < np.inf:
+                length *= _growth(perf_counter() - began)
             status, reason = samples.status, samples.reason
             in_time = how == "steps" or samples.t.size == piece.size
             here = float((piece if in_time else samples.t)[-1]) if status is Status.FINISHED else stepper.t
@@ -230,7 +233,7 @@ def integrate(
                 if watch.due and samples.t.size and sample != "dense" and not acting:
                     lost = _lost(problem, method, samples, stats.steps) | lost
                 if watch.keeps:
-                    t, y = [_joined(t)], [_joined(y, problem.system.dim)]
+                    t, y = ([part] for part in _joined(t, y, problem.system.dim))
                     vectors = None if vectors is None else [np.concatenate(vectors)]
                     lows = None if lows is None else [np.concatenate(lows)]
                     watch.keep(
@@ -266,10 +269,10 @@ def integrate(
         stats.extra = {**stats.extra, "losses": lost}
     if sample == "dense":  # the polynomials conserve nothing
         stats.extra = {**stats.extra, "sample": sample}
-    reached = _joined(t)
+    reached, states = _joined(t, y, problem.system.dim)
     solution = solution_of(
         t=reached,
-        y=_joined(y, problem.system.dim),
+        y=states,
         events={},
         variations=None if vectors is None else np.concatenate(vectors),
         directions=directions,
@@ -350,7 +353,7 @@ def _next_piece(
     the next sample. So pieces give the bits of one call of ``advance``.
     """
     sign = 1.0 if grid[-1] >= here else -1.0
-    if length == np.inf or (taken == grid.size - 1 and sample != "steps" and not by_steps):
+    if taken == grid.size - 1 and sample != "steps" and not by_steps:
         return grid[taken:], sample, grid.size - taken
     goal = here + sign * length
     count = int(np.count_nonzero(sign * (grid[taken:] - goal) <= 0.0))
@@ -365,11 +368,11 @@ def _next_piece(
     return grid[taken : taken + count], sample, count
 
 
-def _joined(parts: list[Array], *row: int) -> Array:
-    """Return pieces, whose rows have this shape, as one array of its own."""
-    if len(parts) == 1:
-        return parts[0].copy()
-    return np.concatenate(parts) if parts else np.empty((0, *row))
+def _joined(t: list[Array], y: list[Array], dim: int) -> tuple[Array, Array]:
+    """Return pieces of times and states as one array each, of its own."""
+    if len(t) == 1:
+        return t[0].copy(), y[0].copy()
+    return (np.concatenate(t), np.concatenate(y)) if t else (np.empty(0), np.empty((0, dim)))
 
 
 def _growth(seconds: float) -> float:

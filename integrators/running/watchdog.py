@@ -57,20 +57,20 @@ class StallDetector:
     ----------
     t, end : float
         Current time, and end of the integration.
+
+    Attributes
+    ----------
+    steps_to_next_look : int
+        Steps to take before the next look.
     """
 
     _count = _total = _seen = 0
     _way = _size = _share = 0.0
-    _look = FIRST_LOOK
+    _look = steps_to_next_look = FIRST_LOOK
 
     def __init__(self, t: float, end: float):
         self._start = self._mark = self._looked = t
         self._end = end
-
-    @property
-    def steps_to_next_look(self) -> int:
-        """Steps to take before the next look."""
-        return min(max(self._look - self._total, 1), LONGEST_WITHOUT_A_LOOK)
 
     def update(self, t: float, steps: int = 1, size: float = math.nan) -> str:
         """Record ``steps`` steps that reached ``t``, where the state has the size ``size``.
@@ -84,6 +84,7 @@ class StallDetector:
         self._count += steps
         if self._total >= self._look and (reason := self._blows_up(t, size)):
             return reason
+        self.steps_to_next_look = min(max(self._look - self._total, 1), LONGEST_WITHOUT_A_LOOK)
         if self._count < STALL_STEPS:
             return ""
         mark, self._mark, count, self._count = self._mark, t, self._count, 0

@@ -38,6 +38,11 @@ class Switches:
     ----------
     system : System
         Of one that is not traced nothing is known.
+
+    Attributes
+    ----------
+    any : bool
+        Whether there may be such times.
     """
 
     def __init__(self, system: System):
@@ -47,6 +52,7 @@ class Switches:
             for node in nodes
             if (has_kink(node) or node.op == "table") and node.args[0].flags & (T | STATE) == T
         ]
+        self.any = bool(self._nodes)
         self._functions: dict[tuple[int, int], TimeFunction] = {}
 
     @cached_property
@@ -55,11 +61,6 @@ class Switches:
         if any(node.args[0].flags & PAR for node in self._nodes):
             return None
         return self._few(np.empty(0))
-
-    @property
-    def any(self) -> bool:
-        """Whether there may be such times."""
-        return bool(self._nodes)
 
     def times(
         self, par: NDArray[np.float64], near: float, far: float

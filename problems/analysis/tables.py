@@ -29,8 +29,9 @@ def check_tables(system: System, par: NDArray[np.float64], t0: float, t1: float)
     problems.errors.InputError
         With the interval of the table and that of its argument.
     """
-    nodes = reachable(system.field.roots) if system.field is not None else []
-    tables = [node for node in nodes if _ends(node) and node.args[0].flags & (T | STATE) == T]
+    kept = vars(system)
+    if (tables := kept.get("_tables_of_time")) is None:
+        tables = kept["_tables_of_time"] = _tables_of_time(system)
     for node in tables:
         pieces = affine_pieces(node.args[0], par)
         if pieces is None or len(pieces) != 1:
@@ -45,6 +46,12 @@ def check_tables(system: System, par: NDArray[np.float64], t0: float, t1: float)
                 f"m.table has data from {first!r} to {last!r}, and from t = {t0!r} to {t1!r} its argument is "
                 f"{low!r} to {high!r}; end earlier, give more points, or m.table(..., extrapolate=True)."
             )
+
+
+def _tables_of_time(system: System) -> list[Node]:
+    """Return the tables of a system's field that end, and whose arguments depend on the time alone."""
+    nodes = reachable(system.field.roots) if system.field is not None else []
+    return [node for node in nodes if _ends(node) and node.args[0].flags & (T | STATE) == T]
 
 
 def states_beyond(

@@ -115,7 +115,8 @@ class Frames:
         memory, stepper = self._memory, self._stepper
         memory.stop = stepper._stop() if self._context.varying else math.inf
         memory.budget = max(stepper._budget(), 1)
-        stepper._provide_solver()
+        if stepper._wants_solver:
+            stepper._provide_solver()
         with stepper._pace:
             outcome = orthonormal(memory)
         if outcome in (TOO_FAR_APART, TOO_LONG):
