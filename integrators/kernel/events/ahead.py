@@ -88,6 +88,8 @@ def way_by_curvature(ctx, search, value, noise, arrived, move):
     """
     t, state, ahead, after = search.time, search.step_state, search.end_state, search.stop_state
     for _ in range(MOVES):
+        if (t + move - search.last) * search.sign > 0.0:  # the field may not be known there
+            return 0
         if not add_slope(ctx, search, t, state, state, move, ahead):
             return 0
         first = function(ctx, search, t + move, ahead)

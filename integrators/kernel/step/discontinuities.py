@@ -11,6 +11,7 @@ from integrators.kernel.step.coefficients import coefficient
 from integrators.kernel.step.control import RETREAT, SHORTEST, SHRINK, TIME_TOLERANCE
 from integrators.kernel.step.estimate import NARROWEST, SMOOTH_GAP, block_size, estimate, is_gap
 from integrators.kernel.step.rounding import known_noise, measure_noise
+from integrators.kernel.step.sums import time_after
 
 BREAKPOINT_OFFSET = 1e-12  # part of a step: as near to a breakpoint the field is looked at
 
@@ -149,8 +150,9 @@ def look_at_ends(ctx):
     inside = max(BREAKPOINT_OFFSET * h, 2.0 * SHORTEST * abs(t))
     inside = inside if ctx.h > 0.0 else -inside
     times[0] = t + inside if discontinuities.boundary == START else t
+    end, _ = time_after(t, ctx.time_low, ctx.h)  # which is not beyond that of the integration by rounding
     for lane in range(1, lanes):
-        times[lane] = t + ctx.h - inside if ends_at_break(ctx) else t + ctx.h
+        times[lane] = end - inside if ends_at_break(ctx) else end
     for d in range(rows):
         index = 8 * (d // 4) + 4 + d % 4 if second else d
         stages[lanes * d] = ctx.state[index]

@@ -19,7 +19,7 @@ METHODS = (
     BDF(rtol=1e-6, atol=1e-8), LSODA(rtol=1e-8, atol=1e-8),
 )  # fmt: skip
 OURS = (HBVM, Gauss)
-WAYS = ("plain", "stop", "dense", "steps", "until", "many", "event")
+WAYS = ("plain", "stop", "dense", "steps", "until", "many", "event", "acts", "acts, steps", "acts, many")
 TOLERANCE = 1e-3  # of BDF, the worst: 3e-5; fixed steps of Gauss(6): 1e-9
 
 
@@ -54,6 +54,16 @@ def reached(problem, method, way, times):
     if way == "many":
         many = integrate_many(problem, method, starts=[problem.y0, problem.y0], times=times)
         return many.status[0].value, many.y[0, -1]
+    if way.startswith("acts"):
+        # An event that changes the state to what it is.
+        acting = Event(lambda y: float(y[0]) - 0.1, then=lambda y: [y[0], y[1]], name="level")
+        if way.endswith("many"):
+            many = integrate_many(
+                problem, method, starts=[problem.y0, problem.y0], times=times, events=acting
+            )
+            return many.status[0].value, many.y[0, -1]
+        made = integrate(problem, method, times, "steps" if way.endswith("steps") else None, events=acting)
+        return made.status.value, made.y[-1]
     if way == "event":
         made = integrate(problem, method, times, events=Event(lambda y: float(y[0]) - 0.1, name="level"))
         return made.status.value, made.y[-1]
@@ -68,7 +78,7 @@ def tried(rng):
     end = t0 + length * rng.choice([1.0, -1.0])
     w, outside = float(rng.uniform(0.5, 5.0)), str(rng.choice(["raises", "nan", "notes"]))
     method, way, asked = METHODS[rng.integers(len(METHODS))], str(rng.choice(WAYS)), []
-    if way in ("dense", "event") and not isinstance(method, OURS):
+    if (way in ("dense", "event") or way.startswith("acts")) and not isinstance(method, OURS):
         way = "plain"
     problem = Problem(Opaque(field_on(t0, end, w, outside, asked), dim=2), y0=[0.3, 0.0], t0=t0, t_end=end)
     times = t0 + (end - t0) * np.append(np.sort(rng.uniform(0.02, 0.999, rng.integers(0, 4))), 1.0)
@@ -79,7 +89,7 @@ def tried(rng):
         y0=[0.3, 0.0], t0=t0, t_end=end,
     )  # fmt: skip
     exact = integrate(free, HBVM(), [end]).y[-1]
-    whole_steps = way == "steps" and getattr(method, "h", None) is not None  # which end before
+    whole_steps = way.endswith("steps") and getattr(method, "h", None) is not None  # which end before
     wrong = not whole_steps and not np.abs(state - exact).max() < TOLERANCE
     if asked or status not in ("finished", "running") or wrong:
         beyond = max((max(min(t0, end) - t, t - max(t0, end)) for t in asked), default=0.0)
