@@ -214,9 +214,7 @@ class CVODEStepper(StepperBase):
     def _step_states(self, end: float) -> tuple[Array, Array]:
         sign, watch = self._towards(end), stall_detector(self, self._tn, end)
         times, states = [self._t], [self._y]
-        while self._tn != times[-1] or (
-            sign * (self._tn - end) < 0.0 and self._step(watch, self._bound())
-        ):
+        while self._tn != times[-1] or (sign * (self._tn - end) < 0.0 and self._step(watch, self._bound())):
             if sign * (self._tn - end) > 0.0:
                 break
             times.append(self._tn)
