@@ -666,7 +666,7 @@ class AdaptiveProgram(HBVMProgram):
         context.surfaces.code = self._sides
         context.surfaces.count = self._surfaces
         context.estimate.absolute[:] = self._absolute
-        context.estimate.line = self._line
+        context.estimate.line, context.estimate.called = self._line, int(not self.system.traced)
         context.estimate.asks = int(self.atol is None or np.any(np.greater(self.atol, 0.0)))
         self.limit(context, 0.0)
         context.controller.stop = context.controller.length_limit = math.inf

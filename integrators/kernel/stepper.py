@@ -20,6 +20,7 @@ from integrators.kernel.context import (
     ADVANCE,
     ANEW,
     BUDGET,
+    DIVERGED,
     DONE,
     GO_ON,
     HALTED,
@@ -36,10 +37,12 @@ from integrators.kernel.implicit.workspace import Solver, Workspace, report
 from integrators.kernel.line.kept import Kept
 from integrators.kernel.native import binary
 from integrators.kernel.native.memory import address
+from integrators.kernel.noise import field_noise, noisy
 from integrators.kernel.pace import FEWEST, Pace
 from integrators.kernel.parts.implicit import ALWAYS_IMPLICIT, AUTO, FOR_VECTORS, NOT_WANTED
 from integrators.kernel.searches import LastingSearch
 from integrators.kernel.spare import Pair, Spare
+from integrators.kernel.step.rule import STAGNATION
 from integrators.kernel.tables import Constants
 from integrators.kernel.tangent.frames import Frames
 from integrators.kernel.tangent.group import Directions
@@ -68,6 +71,10 @@ SHORTEST_TIME = 64  # units in the last place: nothing happens in a time as shor
 # What a field that is not defined somewhere may lead to.
 FROM_UNDEFINED = (Status.NOT_FINITE, Status.STEP_UNDERFLOW, Status.NONLINEAR_DIVERGENCE)
 FIRST_HELD = 16  # steps for which the implicit solver stays at work when it is made; `solve` has more
+
+# Changes that noise makes in a step, relative: an iteration stagnates at ten times as much, and is over at
+# `step.rule.STAGNATION`.
+LEAST_NOISE = 0.1 * STAGNATION
 
 Ended = tuple[Status, str]  # how a run is over before its end, and the reason as a sentence
 Filled = tuple[Array, int, Ended | None]  # samples, how the kernel came back, and why they are the last
@@ -155,13 +162,15 @@ class HBVMStepper(ABC):
         "surfaces.row", "surfaces.length_wanted", "previous.on_surface", "pace.epsilon", "pace.log_density",
         "pace.previous_log_density", "pace.density_slope", "controller.interval", "controller.no_time_scale",
         "estimate.constant_field", "estimate.rescaled", "estimate.borrowed", "estimate.asks", "energy.start",
-        "energy.scale",
+        "energy.scale", "solver.tolerance", "solver.stagnation", "solver.trusted", "solver.log_trusted",
+        "solver.log_residual",
     )  # fmt: skip
     _arrays: ClassVar[tuple[str, ...]] = (
         "state", "error", "next_state", "next_error", "values", "older_values", "blocks.weights",
         "blocks.floored_weights", "discontinuities.records", "discontinuities.boundary_values",
         "discontinuities.previous_boundary_values", "discontinuities.last_coefficients",
         "discontinuities.previous_last_coefficients", "previous.state", "previous.error", "estimate.expected",
+        "estimate.largest",
     )  # fmt: skip
     error: Exception | None = None
     """What a function of the user raised, where the status is ``USER_ERROR``."""
@@ -671,7 +680,23 @@ class HBVMStepper(ABC):
             return Status.EVENT, self.search.hits.reason
         if outcome == ACCUMULATE:
             return accumulated(self.t)
+        added = self._added_by_noise() if outcome in (DIVERGED, SCATTERED) else 0.0
+        if added > LEAST_NOISE:
+            return noisy(self.t, self._context.h, added)
         return failure(outcome, self._program, (self._context, self._partial), self.t, self._solver)
+
+    def _added_by_noise(self) -> float:
+        """Return what noise of a field that is called adds in the step, relative to the size of the state."""
+        system, y, values = self._program.system, self.y, np.empty(self._dim)
+        if not isinstance(system, Opaque) or not y.any():
+            return 0.0
+
+        def field(y: Array) -> Array:
+            system.evaluate(self.t, y, self.par, values)
+            return values.copy()
+
+        with np.errstate(all="ignore"):
+            return abs(self._context.h) * field_noise(field, y).max() / np.abs(y).max()
 
 
 def accumulated(t: float) -> tuple[Status, str]:
@@ -680,18 +705,6 @@ def accumulated(t: float) -> tuple[Status, str]:
         f"events that change the state accumulate at t = {t!r}: the times between them become "
         "too short to be told from none, or the state stays where the event happens."
     )
-
-
-NOISE_MARGIN = 100.0  # times what noise adds in a step is a tolerance that can be had
-NOISE_AT_MOST = 1e-3
-"""Relative change at which an iteration may stagnate because of noise; above it, it has not converged."""
-
-
-def remedy(added: float) -> str:
-    """Return what helps against noise that adds such a part of the state in a step."""
-    tolerance = 10.0 ** math.ceil(math.log10(NOISE_MARGIN * added))
-    smooth = "give a field that is smooth to rounding"
-    return smooth if tolerance > NOISE_AT_MOST else f"{smooth}, or tol={tolerance:.0e} or more"
 
 
 def failure(
@@ -711,12 +724,6 @@ def failure(
         return Status.NONLINEAR_DIVERGENCE, (
             f"the equations of the step from t = {t!r}, h = {ctx.h!r} have no solution near "
             f"the trajectory: the one found oscillates within the step; {shorter(program)}."
-        )
-    best, last = ctx.solver.best, ctx.solver.last
-    if best < NOISE_AT_MOST and last < 100.0 * best:
-        return Status.NONLINEAR_DIVERGENCE, (
-            f"the values of the vector field have noise: in the step from t = {t!r}, h = {ctx.h!r}, the "
-            f"changes of the iteration stop decreasing at {best:.0e} of the state's size; {remedy(best)}."
         )
     return Status.NONLINEAR_DIVERGENCE, (
         f"the {solver} iteration did not converge in the step from t = {t!r}, "

@@ -21,9 +21,10 @@ from integrators.kernel.context import (
     UNSCALED,
     Context,
 )
+from integrators.kernel.noise import noisy
 from integrators.kernel.parts.discontinuities import MOST_RECORDED, NOTHING, START
 from integrators.kernel.step.rule import FIRST_AT_REST, RESTART, SCALE_LASTS
-from integrators.kernel.stepper import Ended, HBVMStepper, Program, remedy
+from integrators.kernel.stepper import Ended, HBVMStepper, Program
 from integrators.options import SHORTEST, SMALLEST
 from integrators.protocol import Array, Samples, Status
 from integrators.refusals import one_thread
@@ -417,11 +418,7 @@ class AdaptiveStepper(HBVMStepper):
                 "the solution may end or be singular here."
             )
         if outcome == NOISY:
-            added = self._context.estimate.added
-            return Status.NONLINEAR_DIVERGENCE, (
-                f"the values of the vector field have noise: in a step of h = {self._context.h!r} from "
-                f"t = {self.t!r} it adds {added:.0e} of the state's size; {remedy(added)}."
-            )
+            return noisy(self.t, self._context.h, self._context.estimate.added)
         if outcome == SLIDING:
             return Status.SLIDING, (
                 f"on both sides of the switching surface that is reached at t = {self.t!r} the field points "

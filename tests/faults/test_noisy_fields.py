@@ -6,6 +6,7 @@ import pytest
 from integrators import HBVM, integrate
 from integrators.protocol import Status
 from problems import Opaque, Problem
+from tests.faults.noisy import cases, wrong
 
 
 def decay(noise):
@@ -42,3 +43,46 @@ def test_single_precision_is_enough_for_a_loose_tolerance():
     assert made.status == Status.FINISHED, made.reason
     # DOP853 at 1e-13: (-0.0239512, 0.9585519)
     assert made.y[-1] == pytest.approx([-0.0239512, 0.9585519], abs=1e-5)
+
+
+@pytest.mark.parametrize("method", [HBVM(), HBVM(solver="newton"), HBVM(tol=1e-10)], ids=repr)
+def test_single_precision_ends_a_tight_tolerance_with_the_one_that_can_be_had(method):
+    # Before: 531,344 steps with HBVM().
+    made = integrate(Problem(Opaque(single, dim=2), y0=[1.0, 0.0], t_end=5.0), method, [5.0])
+    assert made.status == Status.NONLINEAR_DIVERGENCE, made.reason
+    assert "have noise" in made.reason
+    assert "or tol=1e-0" in made.reason
+    assert (made.stats.evaluations or 0) < 5_000  # measured 1,376
+
+
+@pytest.mark.parametrize("noise", [0.1, 1e-4, 1e-6, 1e-8, 1e-10])
+def test_noise_ends_fixed_steps_by_newton_with_its_size(noise):
+    # Before: "take a smaller h".
+    made = integrate(decay(noise), HBVM(k=4, s=2, h=0.1, solver="newton"), [5.0])
+    assert made.status == Status.NONLINEAR_DIVERGENCE
+    assert "have noise" in made.reason
+
+
+def test_a_step_that_is_too_long_for_a_smooth_field_is_not_called_noisy():
+    def steep(t, y):
+        return -1e6 * (y - np.cos(t))
+
+    made = integrate(
+        Problem(Opaque(steep, dim=1), y0=[0.0], t_end=1.0), HBVM(k=4, s=2, h=0.1, solver="fixed_point"), [1.0]
+    )
+    assert made.status == Status.NONLINEAR_DIVERGENCE
+    assert "noise" not in made.reason
+
+
+def search(first, count):
+    """Return what is wrong of so many random cases."""
+    return [what for what in map(wrong, cases(first, count)) if what is not None]
+
+
+def test_runs_with_noise_finish_in_few_steps_or_end_with_its_size():
+    assert search(0, 20) == []
+
+
+@pytest.mark.slow
+def test_many_runs_with_noise_finish_in_few_steps_or_end_with_its_size():
+    assert search(1000, 500) == []

@@ -250,6 +250,7 @@ class Control:
             limited,
             log_ratio(self.h / self.row("previous_length").absolute()),
             *self.evident,
+            0.0,
         )
         self.limit = self.row("length_limit") * APPROACH
         iterations = Value(b, b.load(w.iterations)) - self.row("before")

@@ -25,6 +25,8 @@ class Estimate(Part):
     largest = Array("blocks.groups")  # the largest size, as a velocity, that a block of each group has had
     added = Real()  # what noise adds in a step that it has kept from being solved, relative
     line = Real()  # part of a step on which noise is measured; 0: it is not
+    # 1: the field is a function that is called, and may have more noise than rounding makes in a formula
+    called = Integer()
     measured = Integer()  # 1: noise was measured in the step that was estimated
     evident_error = Real()  # the estimated errors, of what is more than rounding in any field
     evident_quadrature_error = Real()

@@ -16,6 +16,8 @@ FORESEEN = 3.0
 # well (logarithms).
 CAUTION, SHORTFALL = 0.5, 0.25
 LOG_SHRINK = log(SHRINK / SAFETY)
+STEADY = 1.2  # an implicit step that could be longer by less keeps its length, and so the factors
+LOG_STEADY = log(STEADY / SAFETY)
 LOG_2 = log(2.0)
 # Fast modes at rest show neither in the error nor in the first iterations. Where the iteration failed, steps
 # stay this much shorter at first, and then approach that length again by this factor a step.
@@ -104,6 +106,7 @@ def as_errors_allow(
     change,
     error_is_evident,
     quadrature_error_is_evident,
+    least_factor,
 ):
     """Return the logarithm of the next step's length relative to this one's, as the estimates allow.
 
@@ -119,22 +122,25 @@ def as_errors_allow(
         Logarithm of this step's length relative to that of the step before.
     error_is_evident, quadrature_error_is_evident : bool
         Whether the estimates are of more than rounding explains in any field.
+    least_factor : float
+        Logarithm of a factor that is doubted if it is smaller: 0, or `LOG_STEADY` for implicit steps, which
+        keep their length below that, and with it an estimate that does not depend on the length.
 
     Returns
     -------
     factor : float
     in_doubt : bool
-        Whether the step is shortened only by an estimate that may be rounding.
+        Whether the factor is smaller only for an estimate that may be rounding.
     """
     by_error = log_factor(error_aim, error, previous_error, change)
     by_quadrature_error = log_factor(
         quadrature_error_aim, quadrature_error, previous_quadrature_error, change
     )
     factor = where(limited, least(by_quadrature_error, by_error), by_error)
-    evident = (error_is_evident & (by_error < 0.0)) | (
-        quadrature_error_is_evident & limited & (by_quadrature_error < 0.0)
+    evident = (error_is_evident & (by_error < least_factor)) | (
+        quadrature_error_is_evident & limited & (by_quadrature_error < least_factor)
     )
-    return factor, (factor < 0.0) & opposite(evident)
+    return factor, (factor < least_factor) & opposite(evident)
 
 
 @for_both_widths

@@ -10,7 +10,7 @@ from integrators.kernel.step.begin import INFINITY
 from integrators.kernel.step.coefficients import coefficient
 from integrators.kernel.step.control import RETREAT, SHORTEST, SHRINK, TIME_TOLERANCE
 from integrators.kernel.step.estimate import NARROWEST, SMOOTH_GAP, block_size, estimate, is_gap
-from integrators.kernel.step.rounding import known_noise, measure_noise
+from integrators.kernel.step.rounding import known_noise, measure_noise, measure_noise_behind
 from integrators.kernel.step.sums import time_after
 
 BREAKPOINT_OFFSET = 1e-12  # part of a step: as near to a breakpoint the field is looked at
@@ -296,8 +296,19 @@ def confirm_previous_step(ctx):
     call_field(ctx.field, times, stages, ctx.par, values)
     ctx.counters.evaluations += 1
     ctx.discontinuities.boundary = SEEN
-    for d in range(rows):
-        if differs_from_previous(ctx, d, values[lanes * d]):
+    ctx.estimate.measured = 0
+    if differs_behind(ctx):
+        measure_noise_behind(ctx)
+        if differs_behind(ctx):
             undo(ctx)
             return False
     return True
+
+
+@compiled
+def differs_behind(ctx):
+    """Whether the field at the state, in ``sums``, is not what the polynomial of the previous step says."""
+    differs = False
+    for d in range(ctx.rows):
+        differs |= differs_from_previous(ctx, d, ctx.scratch.sums[ctx.lanes * d])
+    return differs

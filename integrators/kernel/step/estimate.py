@@ -30,7 +30,7 @@ from integrators.kernel.step.fixed_point import evaluate
 from integrators.kernel.step.rounding import (
     beyond_noise,
     is_evident,
-    known_noise,
+    known_rounding,
     largest_in_group,
     measure_noise,
     momentum,
@@ -200,7 +200,7 @@ def note_slow_decay(ctx):
         gammas = ctx.estimate.coefficients + 8 * d
         low = lowest(gammas[GAMMA_1], gammas[GAMMA_2], gammas[GAMMA_3])
         b = ctx.blocks.of_row[d]
-        high = beyond_noise(greatest(gammas[BEFORE_LAST], gammas[LAST]), known_noise(ctx, d))
+        high = beyond_noise(greatest(gammas[BEFORE_LAST], gammas[LAST]), known_rounding(ctx, d))
         if is_doubtful(low, high, ctx.discontinuities.doubt) and does_not_decay(ctx, d, gammas[LAST]):
             slow_decay[b] = greatest(slow_decay[b], high)
 
@@ -376,7 +376,7 @@ def measure_blocks(ctx):
             error_decay,
             quadrature_error_decay,
         )
-        noise = known_noise(ctx, d)
+        noise = known_rounding(ctx, d)
         error, quadrature_error = beyond_noise(error, noise), beyond_noise(quadrature_error, noise)
         high = beyond_noise(high, noise)
         doubtful |= is_doubtful(low, high, doubt)

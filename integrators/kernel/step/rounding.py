@@ -29,6 +29,13 @@ BEYOND_NOISE = 40.0
 EVIDENT = 10.0 * STAGNATION
 # Of a component: a line on which it moves by so little tells nothing of the field but noise.
 LEAST_WAY = 2.0**-46
+# Part of its size by which a component's stages are unlike those of any smooth line: they are rounded.
+UNIT = 2.0**-52
+GOLDEN = 0.618  # multiples of it, but for their integers, are in no order
+# Noise of the field itself is as large, within a factor, on a line that is a part as long, and with stages
+# that are so many units from it. That of a structure in the field is not on the one, that of a steep field's
+# stages not with the others.
+SHORTER, UNITS, AS_LARGE = 2.0**-6, 64.0, 8.0
 
 
 @for_both_widths
@@ -58,19 +65,30 @@ def known_noise(ctx, d):
 
 
 @compiled
+def known_rounding(ctx, d):
+    """As `known_noise`, of no more than rounding adds in a step that can be solved."""
+    noise = known_noise(ctx, d)
+    return noise if abs(ctx.h) * noise <= EVIDENT * largest_in_group(ctx, ctx.blocks.of_row[d]) else 0.0
+
+
+@compiled
 def measure_noise(ctx):
     """Set `Estimate.noise` of each block, on lines from both ends of the solved step towards the other one.
 
     A discontinuity is on one of them at most.
     """
-    if not ctx.estimate.line > 0.0:
-        return
-    measure_on_both_lines(ctx)
-    noise = ctx.estimate.noise
-    for b in range(ctx.blocks.count):
-        if not abs(ctx.h) * noise[b] <= ctx.solver.stagnation * largest_in_group(ctx, b):
-            noise[b] = 0.0
-    ctx.estimate.measured = 1
+    if ctx.estimate.line > 0.0:
+        measure_on_both_lines(ctx, ctx.estimate.line, 1.0, ctx.estimate.noise)
+        ctx.estimate.measured = 1
+
+
+@compiled
+def measure_noise_behind(ctx):
+    """As `measure_noise`, on a line from the state towards the start of the previous step."""
+    if ctx.estimate.line > 0.0:
+        h, part = ctx.controller.previous_length, ctx.estimate.line
+        measure_on_line(ctx, ctx.state, ctx.previous.state, 0.0, -h, part, 1.0, ctx.estimate.noise)
+        ctx.estimate.measured = 1
 
 
 @compiled
@@ -80,23 +98,60 @@ def largest_in_group(ctx, b):
 
 
 @compiled
-def measure_on_both_lines(ctx):
-    """Set `Estimate.noise` of each block, whatever it is."""
-    estimate = ctx.estimate
-    noise, other = estimate.noise, estimate.slow_decay
-    measure_on_line(ctx, ctx.state, estimate.line, 0.0, noise)
-    measure_on_line(ctx, ctx.next_state, -estimate.line, ctx.h, other)
+def measure_on_both_lines(ctx, part, units, noise):
+    """Set what is measured of each block on lines from both ends of the solved step, the smaller of the two.
+
+    Parameters
+    ----------
+    part, units : float
+        See `measure_on_line`.
+    noise : array
+        Of all blocks. `Estimate.slow_decay` is not kept.
+    """
+    other = ctx.estimate.slow_decay
+    measure_on_line(ctx, ctx.state, ctx.next_state, 0.0, ctx.h, part, units, noise)
+    measure_on_line(ctx, ctx.next_state, ctx.state, ctx.h, -ctx.h, part, units, other)
     for b in range(ctx.blocks.count):
         noise[b] = min(noise[b], other[b])
-    ctx.counters.evaluations += 2 * ctx.k
 
 
 @compiled
-def noise_in_step(ctx):
-    """Return what noise adds in the attempted step, which has failed: the largest part of a size in a group.
+def added_by_noise(ctx, least):
+    """Return what the field's own noise adds in the attempted step: the largest part of a size in a group.
 
-    The end of the step, which is unknown, is taken from the field at its start.
+    That step has an end, which may be inaccurate. What is not more than ``least`` may be any noise.
     """
+    noise, again, part = ctx.estimate.noise, ctx.estimate.gamma_error, ctx.estimate.line
+    measure_on_both_lines(ctx, part, 1.0, noise)
+    ctx.estimate.measured = 0
+    added = largest_added(ctx)
+    if added <= least:
+        return added
+    measure_on_both_lines(ctx, SHORTER * part, UNITS, again)
+    for b in range(ctx.blocks.count):
+        if not (noise[b] <= AS_LARGE * again[b] and again[b] <= AS_LARGE * noise[b]):
+            noise[b] = 0.0
+    return largest_added(ctx)
+
+
+@compiled
+def largest_added(ctx):
+    """Return what `Estimate.noise` adds to a block in the attempted step, as a part of the largest size.
+
+    Or of the size that errors of the block are relative to, where that is larger: from rest.
+    """
+    estimate, most = ctx.estimate, 0.0
+    for b in range(ctx.blocks.count):
+        known = max(estimate.absolute[b], estimate.expected[b] if estimate.rescaled else 0.0)
+        largest = max(largest_in_group(ctx, b), max(known, estimate.scale[b]))
+        if largest > 0.0:
+            most = max(most, abs(ctx.h) * estimate.noise[b] / largest)
+    return most
+
+
+@compiled
+def predict_end(ctx):
+    """Set the end of the attempted step, which has failed, from the field at its start."""
     start_plain(ctx)
     evaluate(ctx)
     for d in range(ctx.rows):
@@ -106,13 +161,6 @@ def noise_in_step(ctx):
         else:
             ctx.next_state[d] = ctx.state[d] + ctx.h * ctx.values[ctx.lanes * d]
     note_sizes(ctx)
-    measure_on_both_lines(ctx)
-    most = 0.0
-    for b in range(ctx.blocks.count):
-        added, largest = abs(ctx.h) * ctx.estimate.noise[b], largest_in_group(ctx, b)
-        if largest > 0.0:
-            most = max(most, added / largest)
-    return most
 
 
 @compiled
@@ -133,23 +181,41 @@ def momentum(ctx, d):
 
 
 @compiled
-def measure_on_line(ctx, state, part, start, noise):
-    """Set the largest coefficient of high degree of each block, on a line from ``state``.
+def measure_on_line(ctx, state, end, start, h, part, units, noise):
+    """Set the largest coefficient of high degree of each block, on a line from ``state`` towards ``end``.
 
-    It is a part of the solved step, and begins ``start`` after that.
+    Parameters
+    ----------
+    ctx : Context
+    state, end : array
+        States ...
+    start, h : float
+        ... at this time after that of the step, and h later.
+    part : float
+        The line is this part of the way between them.
+    units : float
+        Its points are beside it by so many times what the stages of a solved step may be.
+    noise : array
+        The coefficients, for all blocks.
     """
     rows, lanes, scratch = ctx.rows, ctx.lanes, ctx.scratch
     for chunk in range(ctx.chunks):
         c = get(ctx.tables.nodes, 8 * chunk)
-        put(ctx.times, 8 * chunk, splat8(ctx.t0) + (splat8(start) + c * splat8(part * ctx.h)))
+        put(ctx.times, 8 * chunk, splat8(ctx.t0) + (splat8(start) + c * splat8(part * h)))
         for d in range(rows):
             i = 8 * (d // 4) + 4 + d % 4 if ctx.second else d
-            way = part * (ctx.next_state[i] - ctx.state[i])
-            way += copysign(LEAST_WAY * abs(state[i]), way if way != 0.0 else part)
+            way = part * (end[i] - state[i])
+            way += copysign(LEAST_WAY * abs(state[i]), way if way != 0.0 else h)
             put(scratch.old_stages, offset(ctx, chunk) + lanes * d, splat8(state[i]) + c * splat8(way))
+    for d in range(rows):
+        left = units * UNIT / ctx.blocks.weights[d]
+        for i in range(ctx.k):
+            above = GOLDEN * (i + 1) * (d + 1) % 1.0 < 0.5
+            scratch.old_stages[offset(ctx, i // 8) + lanes * d + i % 8] += left if above else -left
     stages, values = ctx.stages, ctx.values
     ctx.stages, ctx.values = scratch.old_stages, scratch.base
     evaluate(ctx)
+    ctx.counters.evaluations += ctx.k
     for b in range(ctx.blocks.count):
         noise[b] = 0.0
     for d in range(rows):

@@ -26,10 +26,12 @@ from integrators.kernel.simd.operations import binary_log, least
 from integrators.kernel.step.begin import INFINITY, begin, set_step, tabulated_ratio
 from integrators.kernel.step.control import (
     APPROACH,
+    LOG_STEADY,
     RETREAT,
     SAFETY,
     SHORTEST,
     SHRINK,
+    STEADY,
     TIME_TOLERANCE,
     as_errors_allow,
     as_iterations_allow,
@@ -55,14 +57,13 @@ from integrators.kernel.step.fixed_point import iterate_measured
 from integrators.kernel.step.graze import grazes
 from integrators.kernel.step.iterate import end_iteration, extra_iterations, iterate_to_end, test
 from integrators.kernel.step.reversible import keep_pace
-from integrators.kernel.step.rounding import noise_in_step
+from integrators.kernel.step.rounding import EVIDENT, added_by_noise, predict_end
 from integrators.kernel.step.rule import (
     FARTHEST,
     FIRST_RATE,
     ROUNDING,
     SCALE_LASTS,
     SHORTEST_PART,
-    STAGNATION,
 )
 from integrators.kernel.step.solver_switch import request_solver, solve_implicitly
 from integrators.kernel.step.stopping import rate_at_zero, rate_since, takes_too_long, untested
@@ -96,10 +97,9 @@ MOST_ATTEMPTS = 24
 # than such a part of the interval.
 STALL_PART = 1e-4
 STALL_CHECK_EVERY, STALL_CHECKS = 256, 32
-# What noise adds in a step, relative: the iteration stagnates at so many times as much. Nobody waits for the
-# steps, a thousand times as short, that would make up for more than the other number.
-NOISE_MARGIN, MOST_NOISE = 10.0, 1e3 * STAGNATION
-STEADY = 1.2  # an implicit step that could be longer by less keeps its length, and so the factors
+# What noise adds in a step, relative: the iteration stagnates at so many times as much.
+NOISE_MARGIN = 10.0
+LOOK_FOR_NOISE = 2  # rejections in a row at which noise is looked for: smooth steps seldom have so many
 
 
 @compiled
@@ -153,10 +153,10 @@ def iterate(ctx):
 
 
 @compiled
-def length_factor(ctx, error, quadrature_error, most_growth):
+def length_factor(ctx, error, quadrature_error, most_growth, implicit):
     """Return the next step's length relative to this one's, from what is estimated for this one.
 
-    And whether it is shortened by an estimate that may be rounding.
+    And whether that is less than it might be only for an estimate that may be rounding.
     """
     controller, estimated = ctx.controller, ctx.estimate
     if not error < INFINITY:
@@ -179,6 +179,7 @@ def length_factor(ctx, error, quadrature_error, most_growth):
         log_ratio(h / previous) if known else 0.0,
         evident,
         quadrature_evident,
+        LOG_STEADY if implicit else 0.0,
     )
     return bounded(factor, most_growth), in_doubt
 
@@ -312,11 +313,12 @@ def solve_adaptive(ctx):
         ctx.solved = UNSOLVED
         if outcome == NOT_KEPT:
             return outcome
-        if accepts(ctx, outcome, ctx.counters.iterations - before, implicit):
+        accepted = accepts(ctx, outcome, ctx.counters.iterations - before, implicit)
+        if is_noisy(ctx, outcome, implicit, accepted):
+            return NOISY
+        if accepted:
             ctx.solved = BY_VALUES
             return DONE
-        if outcome in (DIVERGED, SCATTERED) and is_noisy(ctx):
-            return NOISY
         if ctx.discontinuities.undone:
             undo(ctx)
             begin_attempts(ctx)
@@ -324,21 +326,45 @@ def solve_adaptive(ctx):
 
 
 @compiled
-def is_noisy(ctx):
-    """Whether the field's noise keeps the attempted step from being solved, and far shorter ones too.
+def is_noisy(ctx, outcome, implicit, accepted):
+    """Whether the field's own noise adds more in the attempted step than rounding would, and than is allowed.
 
-    Of noise that is less than the tolerance the iteration need not do better.
+    Shorter steps have more of it. Of noise that is less the iteration need not leave less. It is measured
+    where a step is not solved, where one that was shortened still takes many iterations, and where one is
+    rejected for the second time for its errors. (The implicit solver damps noise.)
     """
     solver, controller = ctx.solver, ctx.controller
-    if not ctx.estimate.line > 0.0:
+    if ctx.estimate.called == 0 or not ctx.estimate.line > 0.0:
         return False
-    ctx.estimate.added = added = noise_in_step(ctx)
-    if NOISE_MARGIN * added <= solver.stagnation:
+    if outcome in (DIVERGED, SCATTERED):
+        predict_end(ctx)
+    elif outcome != DONE or implicit:
         return False
-    if NOISE_MARGIN * added <= controller.allowed_error:
-        solver.stagnation = NOISE_MARGIN * added
+    elif accepted:
+        shortened = abs(ctx.h) <= SAFETY * abs(controller.previous_length)
+        if solver.tried <= TARGET_ITERATIONS or not shortened:
+            return False
+    elif controller.attempts != LOOK_FOR_NOISE:
         return False
-    return added > MOST_NOISE
+    ctx.estimate.added = added = added_by_noise(ctx, solver.stagnation / NOISE_MARGIN)
+    if added > max(EVIDENT, controller.allowed_error / NOISE_MARGIN):
+        return True
+    if NOISE_MARGIN * added > solver.stagnation:
+        iterate_to(solver, NOISE_MARGIN * added)
+        controller.length_limit = INFINITY  # the length was not to blame
+        if accepted:
+            controller.length_after = ctx.h
+        else:
+            controller.next_length = ctx.h
+    return False
+
+
+@compiled
+def iterate_to(solver, change):
+    """Let the iterations from now on leave such changes, which are noise."""
+    solver.stagnation = solver.tolerance = change
+    solver.log_residual = solver.log_trusted = binary_log(change)
+    solver.trusted = max(solver.trusted, change)
 
 
 @compiled
@@ -378,7 +404,7 @@ def accepts(ctx, outcome, iterations, implicit):
     controller, surfaces = ctx.controller, ctx.surfaces
     error, quadrature_error = estimate_attempt(ctx, outcome, implicit)
     most_growth = MOST_GROWTH if controller.attempts == 0 else 1.0
-    factor, in_doubt = length_factor(ctx, error, quadrature_error, most_growth)
+    factor, in_doubt = length_factor(ctx, error, quadrature_error, most_growth, implicit)
     if outcome == DONE and ctx.estimate.constant_field and abs(ctx.h) > controller.longest_constant:
         reject(ctx, outcome, controller.longest_constant / abs(ctx.h), implicit)
         return False
@@ -386,7 +412,7 @@ def accepts(ctx, outcome, iterations, implicit):
     if good and in_doubt:
         # A trend of noise would go on for ever: its coefficients do not fall with the length.
         error, quadrature_error = estimate_again(ctx, error, quadrature_error, implicit)
-        factor, _ = length_factor(ctx, error, quadrature_error, most_growth)
+        factor, _ = length_factor(ctx, error, quadrature_error, most_growth, implicit)
     if surfaces.code and (surfaces.locating or (surfaces.across != NO_SURFACE and not good)):
         verdict = locate(ctx, outcome, good)
         if verdict == AGAIN:

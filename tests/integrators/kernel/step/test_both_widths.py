@@ -39,7 +39,17 @@ def sizes(t, y, par, out):
 def control(t, y, par, out):
     error, quadrature_error = log_of_order(y[0], 0.05), log_of_order(y[1], 0.04)
     factor, in_doubt = as_errors_allow(
-        error, -y[2], -y[3], quadrature_error, -y[4], -y[5], y[6] < 1.0, y[7] - 1.0, y[0] < 1.0, y[1] < 1.0
+        error,
+        -y[2],
+        -y[3],
+        quadrature_error,
+        -y[4],
+        -y[5],
+        y[6] < 1.0,
+        y[7] - 1.0,
+        y[0] < 1.0,
+        y[1] < 1.0,
+        0.1,
     )
     out[0] = where(in_doubt, factor, -factor)
     out[1] = bounded(factor, 2.0)
