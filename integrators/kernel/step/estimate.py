@@ -49,6 +49,7 @@ SMOOTH_GAP = 100.0
 # A component's low coefficients that are larger than this part of all do not fall off, and are those of a
 # mode at rest where the error they would make is at most that part of the allowed one; see `log_decay`.
 NOT_DECAYING, AT_REST = 0.1, 0.1
+DECAYED = 0.125  # part of the size it had that a block has then
 # Part of the field's mean that its other coefficients are at most where it does not change
 EQUAL_VALUES = 1e-14
 
@@ -339,9 +340,22 @@ def judge_blocks(ctx):
                 )
                 if not fits or (doubtful and h * high > negligible * own):
                     borrowed = 1
+    forget_old_sizes(ctx)
     discontinuities.not_smooth, ctx.estimate.borrowed = not_smooth, borrowed
     ctx.estimate.evident_error, ctx.estimate.evident_quadrature_error = evident, evident_quadrature
     return error, quadrature_error
+
+
+@compiled
+def forget_old_sizes(ctx):
+    """Let the next step measure the blocks where one has decayed since: it would be solved to what it was."""
+    if ctx.second:
+        return
+    blocks = ctx.blocks
+    for b in range(blocks.count):
+        least = LEAST_BLOCK * blocks.largest[blocks.group[b]]
+        if greatest(ctx.estimate.scale[b], least) < DECAYED * blocks.size[b]:
+            blocks.age = 0
 
 
 @compiled

@@ -348,6 +348,7 @@ def is_noisy(ctx, outcome, implicit, accepted):
         return False
     ctx.estimate.added = added = added_by_noise(ctx, solver.stagnation / NOISE_MARGIN)
     if added > max(EVIDENT, controller.allowed_error / NOISE_MARGIN):
+        ctx.discontinuities.count = 0  # it was noise that looked like some
         return True
     if NOISE_MARGIN * added > solver.stagnation:
         iterate_to(solver, NOISE_MARGIN * added)
