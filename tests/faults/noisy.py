@@ -1,4 +1,4 @@
-"""Random smooth systems, methods and noise: what a run with a field that is not smooth to rounding must do."""
+"""Random smooth systems, methods and noise: what runs must do with a field that is not smooth to rounding."""
 
 import zlib
 from collections.abc import Callable, Sequence
