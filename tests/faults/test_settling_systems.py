@@ -116,3 +116,11 @@ def test_ensembles_settle_as_single_trajectories_do(field):
     assert all(said == () for said in many.warnings)
     one = integrate(problem, HBVM(), [END])
     assert np.abs(many.y[0, -1] - one.y[-1]).max() < 1e-15 * 4.0
+
+
+def test_a_decay_keeps_its_digits_and_is_no_discontinuity():
+    # Before: a relative error of 1.4e-11 in 56 steps, and a warning of a discontinuity.
+    made = integrate(Problem(VectorField(lambda y: [-y[0]], dim=1), y0=[1.0], t_end=END), HBVM(), [END])
+    assert made.y[-1, 0] == pytest.approx(np.exp(-END), rel=1e-13)  # measured 1.3e-14
+    assert made.stats.steps < 50  # 39
+    assert made.warnings == ()

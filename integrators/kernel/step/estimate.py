@@ -49,7 +49,7 @@ SMOOTH_GAP = 100.0
 # A component's low coefficients that are larger than this part of all do not fall off, and are those of a
 # mode at rest where the error they would make is at most that part of the allowed one; see `log_decay`.
 NOT_DECAYING, AT_REST = 0.1, 0.1
-DECAYED = 0.125  # part of the size it had that a block has then
+DECAYED = 2.0**-6  # part of the size it had that a block has then
 # Part of the field's mean that its other coefficients are at most where it does not change
 EQUAL_VALUES = 1e-14
 
