@@ -79,6 +79,7 @@ def search(first, count):
     return [what for what in map(wrong, cases(first, count)) if what is not None]
 
 
+@pytest.mark.slow
 def test_runs_with_noise_finish_in_few_steps_or_end_with_its_size():
     assert search(0, 20) == []
 
