@@ -237,7 +237,7 @@ def file_of(name_or_path: str) -> Path:
             raise InputError(f"there is no campaign file {name_or_path!r}.")
         return path
     if name_or_path not in shipped():
-        if path.is_dir():
+        if name_or_path and path.is_dir():
             raise InputError(f"the folder {name_or_path!r} has no {STUDY}.")
         raise unknown("campaign", name_or_path, shipped())
     return shipped()[name_or_path]

@@ -34,6 +34,9 @@ from problems.graph.source_line import refuse, users_line
 T, Q, P, PAR = 1, 2, 4, 8  # what a node depends on: time, positions, momenta, parameters
 STATE = Q | P
 
+LARGEST_POWER = 1000
+"""Largest integer exponent, which becomes products."""
+
 
 def is_power_of_two(value: float) -> bool:
     """Whether multiplying by ``value`` is exact (barring overflow and underflow)."""
@@ -210,7 +213,9 @@ class Node:
         if not isinstance(exponent, numbers.Real) or isinstance(exponent, bool):
             refuse(f"the exponent {exponent!r} is not a number", "give an integer or half an integer")
         twice = 2 * float(exponent)
-        if not twice.is_integer() or abs(twice) > 2000:
+        if float(exponent).is_integer() and abs(twice) > 2 * LARGEST_POWER:
+            refuse(f"the exponent {exponent!r} is above {LARGEST_POWER}", "give a smaller one")
+        if not twice.is_integer() or abs(twice) > 2 * LARGEST_POWER:
             return self._real_power(self.graph.node(exponent))
         return self.graph.power(self, int(twice))
 

@@ -239,7 +239,7 @@ def test_who_does_not_look_for_kinks_says_so(method, why):
     solution = integrators.integrate(Problem(valley, q0=[1.0], p0=[0.0], t_end=2.0), method, [2.0])
     warning, *more = solution.warnings
     sentence(warning, why)
-    assert all("energy has changed" in sentence for sentence in more)  # LineIntegral's, over the jump
+    assert all(said.startswith("energy has") for said in more)  # LineIntegral's, over the jump
     assert method.caveat(problems.load("kepler")) is None
 
 

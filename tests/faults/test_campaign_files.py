@@ -157,7 +157,7 @@ RIGHT\n[timing]\nshortest = nan                              => Expected `float`
 RIGHT\n[timing]\nshortest = inf                              => Expected `float` <= 1e+300, at
 RIGHT\n[timing]\nbudget = -1                                 => Expected `float` > 0.0, at `timing.budget`
 RIGHT\n[timing]\nbudget = nan                                => Expected `float` > 0.0, at `timing.budget`
-RIGHT\n[timing]\nround = 3                                   => unknown key 'round'; did you mean 'rounds'?
+RIGHT\n[timing]\nround = 3                                   => unknown key 'round'; did you mean 'rounds'
 RIGHT\nchecks = 3                                            => Expected `object`, got `int`, at `checks`
 RIGHT\n[checks]\nstarts = -1                                 => Expected `int` >= 0, at `checks.starts`
 RIGHT\n[checks]\nstarts = 1001                               => Expected `int` <= 1000, at `checks.starts`

@@ -199,7 +199,7 @@ def test_a_run_has_positions_where_a_reference_was_asked_for(folder, capsys):
     printed = capsys.readouterr()
     assert "running the Python file mine.py, which mine.toml names" in printed.err
     assert "position" not in printed.out.splitlines()[2]
-    assert "positions are not measured" in "".join(markdown(document(Store(folder / "run"))))
+    assert "No stored reference for" in "".join(markdown(document(Store(folder / "run"))))
     (folder / "mine.toml").write_text(without.replace('",', '", reference = true,', 1))
     assert cli.main(["run", "mine.toml", "--out", "run"]) == 0
     printed = capsys.readouterr()

@@ -5,10 +5,10 @@ import pytest
 pytest.importorskip("playwright.sync_api")
 
 from hbvm_bench.report.document import Claim, Claims, Document, Section
+from hbvm_bench.report.figures.drawn import LOOKS
 from hbvm_bench.report.page import document, page_of
 from hbvm_bench.report.write import write
 from hbvm_bench.store.store import Store
-from hbvm_bench.studies.drawn import LOOKS
 from hbvm_bench.studies.paper.experiments.properties import Order
 from hbvm_bench.studies.paper.properties_part import order
 from hbvm_bench.summaries.table import Table

@@ -48,7 +48,7 @@ def test_a_case_that_works_has_metrics_and_series(toys, store):
     assert record.versions["toys"] == "1.0"
     # the toy stays at rest, so its energy is exact
     assert record.result.metrics["energy_max"].value == 0.0
-    assert record.result.metrics["position_end"].why.startswith("the reference ")
+    assert record.result.metrics["position_end"].why.startswith("the stored reference ")
     assert record.peak_memory_gib > 0.01
     assert store.series(record.id)["y"].shape == (5, 18)
 
