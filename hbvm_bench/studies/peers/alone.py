@@ -355,6 +355,31 @@ def _pyhamsys(system: System, method: Any) -> Begin:
     return begin
 
 
+def _pynamicalsys(system: System, method: Any) -> Begin:
+    """``HamiltonianSystem(...).trajectory(q, p, total_time)``, functions compiled; it keeps all its states."""
+    library = load("pynamicalsys")
+    from integrators.peers.pynamicalsys import ImplicitMidpoint, equations, gradients
+
+    midpoint, dof = isinstance(method, ImplicitMidpoint), system.dof or 0
+    names = ("eom", "hess_H") if midpoint else ("grad_T", "grad_V")
+    functions = dict(zip(names, (equations if midpoint else gradients)(system), strict=True))
+
+    def begin(y0: Array, par: Array, t0: float) -> Call:
+        own = library.HamiltonianSystem(**functions, degrees_of_freedom=dof, number_of_parameters=par.size)
+
+        def go(t_end: float) -> Any:
+            step = (t_end - t0) / max(1, round((t_end - t0) / method.h))  # it takes whole steps only
+            if midpoint:
+                own.integrator("imp", time_step=step, tol=method.tol, max_iter=method.max_iter)
+            else:
+                own.integrator("svy4", time_step=step)
+            return own.trajectory(y0[:dof], y0[dof:], t_end - t0, parameters=par)
+
+        return Call(go, lambda states: (len(states) - 1, states[-1, 1:]))
+
+    return begin
+
+
 def _alone(method: type[MethodBase]) -> type[MethodBase]:
     """Return a method of a library with the library's own calls in place of the adapter."""
     script, program = SCRIPTS[method.library]
@@ -374,6 +399,7 @@ SCRIPTS: dict[str, tuple[Script, type[Program]]] = {
     "scipy": (_scipy, Program),
     "scikit-sundae": (_sundae, Program),
     "pyhamsys": (_pyhamsys, Program),
+    "pynamicalsys": (_pynamicalsys, Program),
 }
 METHODS = {
     method.__name__: _alone(method)
