@@ -3,6 +3,7 @@
 import doctest
 import inspect
 import re
+import sys
 from pathlib import Path
 
 import pytest
