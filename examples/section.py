@@ -63,7 +63,7 @@ def pynamicalsyss():
 
 
 def by_pynamicalsys(counts: list[int]) -> list[np.ndarray]:
-    """Return so many passages of each orbit by pynamicalsys, which interpolates linearly between two steps."""
+    """Return so many passages of each orbit by pynamicalsys, which interpolates linearly between steps."""
     system = pynamicalsyss()
     return [
         system.poincare_section(start[:2], start[2:], count + 1)[1:, 1:]  # the first one is the start

@@ -82,7 +82,7 @@ class Yoshida4(FixedStep):
     def refuses(self, system: System) -> str | None:
         """Return None for H = sum of c p^2/2 + V(q), else the reason."""
         if not system.separable:
-            return "it needs a separable Hamiltonian, H = sum of c p^2/2 + V(q), to drift and to kick in turn."
+            return "it needs a separable Hamiltonian, H = sum of c p^2/2 + V(q), to drift and kick in turn."
         return _with_time(system)
 
     def march(self, system: System) -> March:
@@ -177,12 +177,13 @@ class ImplicitMidpoint(FixedStep):
 
 
 def gradients(system: System) -> tuple[Any, Any]:
-    """Return ``grad_T(p, par)`` and ``grad_V(q, par)`` of a separable Hamiltonian, compiled, as it calls them."""
+    """Return ``grad_T(p, par)`` and ``grad_V(q, par)`` of a separable Hamiltonian, compiled."""
     import numba
 
     from problems import targets
 
-    force, scale, dof = targets.numba(system, "force"), targets.numba(system, "velocity_scale"), system.dof or 0
+    force, scale = targets.numba(system, "force"), targets.numba(system, "velocity_scale")
+    dof = system.dof or 0
 
     @numba.njit(error_model="numpy")
     def grad_T(p: Array, par: Array) -> Array:
@@ -200,7 +201,7 @@ def gradients(system: System) -> tuple[Any, Any]:
 
 
 def equations(system: System) -> tuple[Any, Any]:
-    """Return ``eom(q, p, par) -> (q', p')`` and ``hess_H(q, p, par)``, compiled, as the library calls them."""
+    """Return ``eom(q, p, par) -> (q', p')`` and ``hess_H(q, p, par)``, compiled."""
     import numba
 
     from problems import targets

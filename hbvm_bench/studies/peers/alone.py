@@ -356,7 +356,7 @@ def _pyhamsys(system: System, method: Any) -> Begin:
 
 
 def _pynamicalsys(system: System, method: Any) -> Begin:
-    """``HamiltonianSystem(...).trajectory(q, p, total_time)``, functions compiled; it keeps all its states."""
+    """``HamiltonianSystem(...).trajectory(q, p, total_time)``, functions compiled; it keeps all states."""
     library = load("pynamicalsys")
     from integrators.peers.pynamicalsys import ImplicitMidpoint, equations, gradients
 
@@ -367,15 +367,21 @@ def _pynamicalsys(system: System, method: Any) -> Begin:
     def begin(y0: Array, par: Array, t0: float) -> Call:
         own = library.HamiltonianSystem(**functions, degrees_of_freedom=dof, number_of_parameters=par.size)
 
-        def go(t_end: float) -> Any:
-            step = (t_end - t0) / max(1, round((t_end - t0) / method.h))  # it takes whole steps only
+        def steps(y: Array, step: float, length: float) -> Array:
             if midpoint:
                 own.integrator("imp", time_step=step, tol=method.tol, max_iter=method.max_iter)
             else:
                 own.integrator("svy4", time_step=step)
-            return own.trajectory(y0[:dof], y0[dof:], t_end - t0, parameters=par)
+            return own.trajectory(y[:dof], y[dof:], length, parameters=par)[:, 1:]
 
-        return Call(go, lambda states: (len(states) - 1, states[-1, 1:]))
+        def go(t_end: float) -> tuple[int, Array]:
+            count = int((t_end - t0) / method.h + 1e-9)
+            y, rest = steps(y0, method.h, count * method.h)[-1], t_end - t0 - count * method.h
+            if rest > 1e-9 * method.h:  # it takes whole steps only, and this one is shorter
+                y = steps(y, rest, rest)[-1]
+            return count, y
+
+        return Call(go, lambda end: end)
 
     return begin
 

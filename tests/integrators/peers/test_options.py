@@ -185,7 +185,7 @@ def test_a_missing_library_is_named_with_its_remedy(method, module, monkeypatch)
 def test_a_library_of_no_extra_is_named_with_its_own_remedy(method, monkeypatch):
     monkeypatch.setitem(sys.modules, "pynamicalsys.hamiltonian_systems.fixed_step", None)
     monkeypatch.setitem(sys.modules, "pynamicalsys", None)
-    with pytest.raises(MissingLibraryError, match=r"not installed .*; install it with pip install pynamicalsys\."):
+    with pytest.raises(MissingLibraryError, match=r"is not installed .* pip install pynamicalsys"):
         method.compile(testing.two_bodies().system)
 
 
@@ -205,7 +205,8 @@ def test_a_linux_without_wheels_of_scikit_sundae_is_told_where_there_are_some(mo
 
 def test_importing_the_peers_imports_no_peer():
     code = (
-        "import sys, integrators.peers.heyoka.taylor, integrators.peers.rebound, integrators.peers.pynamicalsys\n"
+        "import sys, integrators.peers.heyoka.taylor, integrators.peers.rebound\n"
+        "import integrators.peers.pynamicalsys\n"
         "import integrators.peers.diffrax.methods, integrators.peers.scipy\n"
         "heavy = 'heyoka', 'rebound', 'jax', 'diffrax', 'numba', 'scipy.integrate'\n"
         "print([m for m in heavy if m in sys.modules])"
