@@ -29,10 +29,10 @@ METHODS = [
     Dopri8(h=0.1),
     DOP853(rtol=1e-9, atol=1e-9),
     Radau(rtol=1e-9, atol=1e-9),
-    CVODE(rtol=1e-9, atol=1e-9),
-    Composition(h=0.1),
     Yoshida4(h=0.1),
     ImplicitMidpoint(h=0.1),
+    CVODE(rtol=1e-9, atol=1e-9),
+    Composition(h=0.1),
 ]
 
 
