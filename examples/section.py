@@ -1,6 +1,11 @@
-"""A Poincaré section of Hénon and Heiles' problem: twelve orbits, most of which lie on curves."""
+"""A Poincaré section of Hénon and Heiles' problem: twelve orbits, most of which lie on curves.
+
+Beside heyoka's events, and pynamicalsys's section where it is installed: it is no dependency (``pip install
+pynamicalsys``).
+"""
 
 from functools import cache
+from importlib.util import find_spec
 
 import heyoka as hy
 import numpy as np
@@ -47,8 +52,27 @@ def by_heyoka() -> list[np.ndarray]:
     return made
 
 
+@cache
+def pynamicalsyss():
+    """Return the system of pynamicalsys, one of its own models; Yoshida's composition is its default."""
+    from pynamicalsys import HamiltonianSystem
+
+    system = HamiltonianSystem(model="henon heiles")
+    system.integrator("svy4", time_step=0.01)
+    return system
+
+
+def by_pynamicalsys(counts: list[int]) -> list[np.ndarray]:
+    """Return so many passages of each orbit by pynamicalsys, which interpolates linearly between steps."""
+    system = pynamicalsyss()
+    return [
+        system.poincare_section(start[:2], start[2:], count + 1)[1:, 1:]  # the first one is the start
+        for start, count in zip(starts(), counts, strict=True)
+    ]
+
+
 def compare() -> Comparison:
-    """Make the section with ours and with heyoka's events."""
+    """Make the section with ours, with heyoka's events and with pynamicalsys's section."""
     problem = problems.load("henon_heiles", t_end=END)
     surface = integrators.Event(lambda q: q[0], direction=1, name="section")
 
@@ -70,6 +94,9 @@ def compare() -> Comparison:
     )
     made.add("HBVM()", lambda: ours(integrators.HBVM()), error, energy)
     made.add("heyoka", by_heyoka, error, energy)
+    if find_spec("pynamicalsys"):
+        counts = [len(true) for true in exact]
+        made.add("pynamicalsys's Yoshida 4", lambda: by_pynamicalsys(counts), error, energy)
     return made
 
 

@@ -42,6 +42,8 @@ if TYPE_CHECKING:
     from integrators.peers.diffrax.methods import Tsit5 as Tsit5
     from integrators.peers.heyoka.taylor import Taylor as Taylor
     from integrators.peers.pyhamsys import Composition as Composition
+    from integrators.peers.pynamicalsys import ImplicitMidpoint as ImplicitMidpoint
+    from integrators.peers.pynamicalsys import Yoshida4 as Yoshida4
     from integrators.peers.rebound import BS as BS
     from integrators.peers.rebound import EOS as EOS
     from integrators.peers.rebound import IAS15 as IAS15
@@ -78,6 +80,7 @@ __all__ = [
     "Dopri8",
     "Event",
     "Gauss",
+    "ImplicitMidpoint",
     "Kvaerno5",
     "Leapfrog",
     "LeapfrogMidpoint",
@@ -97,6 +100,7 @@ __all__ = [
     "Tsit5",
     "WHFast",
     "WHFast512",
+    "Yoshida4",
     "advise",
     "from_rebound",
     "gradient",

@@ -27,6 +27,7 @@ BUILT_IN = {
         "Dopri8", "Kvaerno5", "LeapfrogMidpoint", "ReversibleHeun", "SemiImplicitEuler", "Tsit5",
     ),
     "integrators.peers.pyhamsys": ("Composition",),
+    "integrators.peers.pynamicalsys": ("ImplicitMidpoint", "Yoshida4"),
     "integrators.peers.sundials": ("CVODE",),
     "integrators.peers.scipy": ("BDF", "DOP853", "LSODA", "Radau"),
 }  # fmt: skip

@@ -3,11 +3,12 @@
 import os
 import signal
 import sys
+from importlib.util import find_spec
 
 import pytest
 from hypothesis import settings
 
-from integrators.peers import without_wheels
+from integrators.peers import APART, without_wheels
 from problems.errors import MissingLibraryError
 
 # What decides whether a change lands is the same every time; at home hypothesis goes on looking.
@@ -19,9 +20,10 @@ settings.load_profile("ci" if os.environ.get("CI") else "home")
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-# Libraries that have no wheels for this system; elsewhere the tests want every one of them.
-# WITHOUT="heyoka ..." hides more of them, as they are hidden there.
-ABSENT = {*without_wheels(), *os.environ.get("WITHOUT", "").split()}
+# Libraries that have no wheels for this system, and those apart that are not installed; the tests want every
+# other one. WITHOUT="heyoka ..." hides more of them, as they are hidden there.
+APART_ABSENT = [library for library in APART if find_spec(library) is None]
+ABSENT = {*without_wheels(), *APART_ABSENT, *os.environ.get("WITHOUT", "").split()}
 sys.modules.update(dict.fromkeys(ABSENT))
 
 

@@ -42,6 +42,7 @@ COMPUTES_WITH = {
     "scipy": ("scipy", "numpy", "numba"),
     "scikit-sundae": ("scikit-sundae", "numpy", "numba"),
     "pyhamsys": ("pyhamsys", "numpy", "numba"),
+    "pynamicalsys": ("pynamicalsys", "numpy", "numba"),
 }
 
 

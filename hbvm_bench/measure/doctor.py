@@ -17,7 +17,7 @@ import integrators.registry
 from hbvm_bench.campaign.identity import version_of
 from hbvm_bench.measure import machine, timing
 from hbvm_bench.measure.timing import calibrate
-from integrators.peers import without_wheels
+from integrators.peers import APART, without_wheels
 from problems.errors import InputError
 
 State = Literal["ok", "note", "bad"]
@@ -86,13 +86,19 @@ def libraries() -> list[Finding]:
                 if name in without_wheels():
                     absent = Finding(name, "note", "not installed: it has no wheels for this system")
                 findings.append(absent)
+    for name in APART:
+        try:
+            findings.append(Finding(name, "ok", version(name)))
+        except PackageNotFoundError:
+            missing = "not installed: its methods are refused"
+            findings.append(Finding(name, "note", missing, f"pip install {name}"))
     return findings
 
 
 def methods() -> list[Finding]:
     """Return the registered methods of libraries that are no extra of ours, and those that fail to load."""
     findings: list[Finding] = []
-    known = {"hbvm-bench", "scipy"}.union(*(names for names, _ in EXTRAS.values()))
+    known = {"hbvm-bench", "scipy", *APART}.union(*(names for names, _ in EXTRAS.values()))
     for name in integrators.registry.names():
         try:
             library = integrators.registry.get(name).library

@@ -19,6 +19,7 @@ BUILT = {
     "rebound": "generic wheel",
     "scipy": "generic wheel; vector field compiled on this machine by numba",
     "scikit-sundae": "generic wheel; vector field and Jacobian compiled on this machine by numba",
+    "pynamicalsys": "compiled on this machine by numba",
     "pyhamsys": "a loop in Python; maps compiled on this machine by numba",
 }
 

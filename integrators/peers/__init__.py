@@ -1,6 +1,6 @@
 """Established integrators of other libraries behind the stepper protocol.
 
-heyoka, REBOUND, diffrax, SciPy, SUNDIALS and pyhamsys.
+heyoka, REBOUND, diffrax, SciPy, SUNDIALS, pyhamsys and pynamicalsys.
 
 The modules are named after the libraries; each imports its library by `load`, only when a
 method is compiled, so importing a module here costs nothing and needs nothing installed.
@@ -18,6 +18,9 @@ UNTRACED = "it needs the field as a formula, not as a function; write it as a Ve
 
 WHEELS = {"heyoka": "Linux only", "scikit-sundae": "x86-64 only, and for macOS"}
 """Of libraries without wheels for some systems, for which there are some, as the extra ``peers`` says too."""
+
+APART = ("pynamicalsys",)
+"""Libraries that the extra ``peers`` does not install."""
 
 
 def without_wheels() -> list[str]:
@@ -49,6 +52,8 @@ def load(library: str, *modules: str) -> ModuleType:
     except ImportError as error:
         if library in without_wheels():
             fix = f"it has wheels for {WHEELS[library]}; on this system it must be built from its sources."
+        elif library in APART:
+            fix = f"install it with pip install {library}."
         else:
             fix = 'install the peers with pip install "hbvm-bench[peers]".'
         raise MissingLibraryError(f"{library} is not installed ({error}); {fix}") from error

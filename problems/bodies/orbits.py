@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from problems.checks import CheckedOptions
-from problems.errors import InputError, shown
+from problems.errors import InputError, shown, unknown
 from problems.quantities import refuse_more_than_numbers
 
 Array = NDArray[np.float64]
@@ -228,6 +228,8 @@ def primary_index(primary: Any, names: tuple[str, ...], n: int) -> int | str:
     """
     if primary in (JACOBI, BARYCENTRIC):
         return primary
+    if names and isinstance(primary, str) and primary not in names:
+        raise unknown("primary", primary, (*names, JACOBI, BARYCENTRIC))
     return body_index(primary, names, n)
 
 

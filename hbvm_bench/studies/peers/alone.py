@@ -355,6 +355,37 @@ def _pyhamsys(system: System, method: Any) -> Begin:
     return begin
 
 
+def _pynamicalsys(system: System, method: Any) -> Begin:
+    """``HamiltonianSystem(...).trajectory(q, p, total_time)``, functions compiled; it keeps all states."""
+    library = load("pynamicalsys")
+    from integrators.peers.pynamicalsys import ImplicitMidpoint, equations, gradients
+
+    midpoint, dof = isinstance(method, ImplicitMidpoint), system.dof or 0
+    names = ("eom", "hess_H") if midpoint else ("grad_T", "grad_V")
+    functions = dict(zip(names, (equations if midpoint else gradients)(system), strict=True))
+
+    def begin(y0: Array, par: Array, t0: float) -> Call:
+        own = library.HamiltonianSystem(**functions, degrees_of_freedom=dof, number_of_parameters=par.size)
+
+        def steps(y: Array, step: float, length: float) -> Array:
+            if midpoint:
+                own.integrator("imp", time_step=step, tol=method.tol, max_iter=method.max_iter)
+            else:
+                own.integrator("svy4", time_step=step)
+            return own.trajectory(y[:dof], y[dof:], length, parameters=par)[:, 1:]
+
+        def go(t_end: float) -> tuple[int, Array]:
+            count = int((t_end - t0) / method.h + 1e-9)
+            y, rest = steps(y0, method.h, count * method.h)[-1], t_end - t0 - count * method.h
+            if rest > 1e-9 * method.h:  # it takes whole steps only, and this one is shorter
+                y = steps(y, rest, rest)[-1]
+            return count, y
+
+        return Call(go, lambda end: end)
+
+    return begin
+
+
 def _alone(method: type[MethodBase]) -> type[MethodBase]:
     """Return a method of a library with the library's own calls in place of the adapter."""
     script, program = SCRIPTS[method.library]
@@ -374,6 +405,7 @@ SCRIPTS: dict[str, tuple[Script, type[Program]]] = {
     "scipy": (_scipy, Program),
     "scikit-sundae": (_sundae, Program),
     "pyhamsys": (_pyhamsys, Program),
+    "pynamicalsys": (_pynamicalsys, Program),
 }
 METHODS = {
     method.__name__: _alone(method)

@@ -17,6 +17,8 @@ SET = (
     ("gravity", ("basic",), "its gravity is {!r}, not 'basic'"),
     ("collision", ("none",), "it looks for collisions ({!r})"),
     ("boundary", ("none",), "it has a boundary ({!r})"),
+    *((f"N_ghost_{axis}", (0,), f"it has ghost boxes (N_ghost_{axis}={{!r}})") for axis in "xyz"),
+    ("OMEGA", (0.0,), "its frame rotates (OMEGA={!r}), as SEI's does"),
     ("testparticle_type", (0,), "its test particles pull the others (testparticle_type={!r})"),
     ("N_var", (0,), "it has variational particles"),
     ("_gravity_custom", UNSET, "it has a gravity of its own (gravity_custom)"),
@@ -59,8 +61,8 @@ def from_rebound(simulation: Any, *, t_end: float, forces: Sequence[Any] = ()) -
     ------
     problems.errors.InputError
         For a simulation with massless bodies between others, and with what a problem does not have:
-        collisions, boundaries, another gravity, additional forces, functions that are called at each step,
-        distances that end it. The sentence names it.
+        collisions, boundaries, ghost boxes, a rotating frame, another gravity, additional forces, functions
+        that are called at each step, distances that end it. The sentence names it.
 
     Examples
     --------

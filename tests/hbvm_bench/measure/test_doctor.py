@@ -13,7 +13,7 @@ from hbvm_bench.measure import doctor, machine
 
 def test_everything_that_is_installed_has_its_version():
     found = {one.subject: one for one in doctor.examine(calibration=False)["installed"]}
-    peers = {"heyoka", "rebound", "diffrax", "pyhamsys", "scikit-sundae"}
+    peers = {"heyoka", "rebound", "diffrax", "pyhamsys", "scikit-sundae", "pynamicalsys"}
     assert {"hbvm-bench", "distributed", "pyarrow", "browser"} | peers == found.keys()
     assert all(one.observed for one in found.values())
     assert found["hbvm-bench"].state == "ok"
@@ -26,6 +26,7 @@ def test_a_missing_peer_is_bad_and_a_missing_extra_is_a_note(monkeypatch):
     monkeypatch.setattr(doctor, "version", version)
     found = {one.subject: one for one in doctor.libraries()}
     assert (found["heyoka"].state, found["pyarrow"].state) == ("bad", "note")
+    assert (found["pynamicalsys"].state, found["pynamicalsys"].advice) == ("note", "pip install pynamicalsys")
     assert found["rebound"].advice == "pip install 'hbvm-bench[peers]'"
     assert not doctor.healthy({"installed": list(found.values())})
 

@@ -12,6 +12,7 @@ from integrators.peers.diffrax.methods import (
 )
 from integrators.peers.heyoka.taylor import Taylor
 from integrators.peers.pyhamsys import Composition
+from integrators.peers.pynamicalsys import ImplicitMidpoint, Yoshida4
 from integrators.peers.rebound import (
     BS,
     EOS,
@@ -65,6 +66,8 @@ CASES = [
     (CVODE(rtol=1e-9, atol=1e-11, method="Adams"), testing.two_bodies),
     (Composition(h=0.02), testing.two_bodies),
     (Composition(h=0.05, type="RKN6a"), testing.pendulum),
+    (Yoshida4(h=0.02), testing.two_bodies),
+    (ImplicitMidpoint(h=0.05), testing.pendulum),
 ]
 
 

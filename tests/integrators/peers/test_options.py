@@ -11,6 +11,7 @@ from integrators import registry
 from integrators.peers.diffrax.methods import Dopri8, LeapfrogMidpoint, ReversibleHeun, SemiImplicitEuler
 from integrators.peers.heyoka.taylor import Taylor
 from integrators.peers.pyhamsys import Composition
+from integrators.peers.pynamicalsys import ImplicitMidpoint, Yoshida4
 from integrators.peers.rebound import IAS15, Leapfrog, WHFast
 from integrators.peers.scipy import DOP853, RTOL_FLOOR, Radau
 from integrators.peers.sundials import CVODE
@@ -28,6 +29,8 @@ METHODS = [
     Dopri8(h=0.1),
     DOP853(rtol=1e-9, atol=1e-9),
     Radau(rtol=1e-9, atol=1e-9),
+    Yoshida4(h=0.1),
+    ImplicitMidpoint(h=0.1),
     CVODE(rtol=1e-9, atol=1e-9),
     Composition(h=0.1),
 ]
@@ -178,6 +181,14 @@ def test_a_missing_library_is_named_with_its_remedy(method, module, monkeypatch)
         method.compile(testing.two_bodies().system)
 
 
+@pytest.mark.parametrize("method", [Yoshida4(h=0.1), ImplicitMidpoint(h=0.1)], ids=repr)
+def test_a_library_of_no_extra_is_named_with_its_own_remedy(method, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pynamicalsys.hamiltonian_systems.fixed_step", None)
+    monkeypatch.setitem(sys.modules, "pynamicalsys", None)
+    with pytest.raises(MissingLibraryError, match=r"is not installed .* pip install pynamicalsys"):
+        method.compile(testing.two_bodies().system)
+
+
 def test_a_library_without_wheels_for_this_system_is_said_to_have_none(monkeypatch):
     monkeypatch.setitem(sys.modules, "heyoka", None)
     monkeypatch.setattr(sys, "platform", "darwin")
@@ -195,6 +206,7 @@ def test_a_linux_without_wheels_of_scikit_sundae_is_told_where_there_are_some(mo
 def test_importing_the_peers_imports_no_peer():
     code = (
         "import sys, integrators.peers.heyoka.taylor, integrators.peers.rebound\n"
+        "import integrators.peers.pynamicalsys\n"
         "import integrators.peers.diffrax.methods, integrators.peers.scipy\n"
         "heavy = 'heyoka', 'rebound', 'jax', 'diffrax', 'numba', 'scipy.integrate'\n"
         "print([m for m in heavy if m in sys.modules])"

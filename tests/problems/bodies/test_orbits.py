@@ -224,6 +224,12 @@ def test_five_hundred_test_particles_are_one_call():
         (lambda: nbody([1.0, 0.1], orbits=[], t_end=1.0), "there are 1 bodies besides"),
         (lambda: nbody([1.0, 0.1], orbits=[Orbit(a=1.0, primary=1)], t_end=1.0), "give that one before"),
         (lambda: nbody([1.0, 0.1], orbits=[Orbit(a=1.0, primary="Sol")], t_end=1.0), "no body 'Sol'"),
+        (
+            lambda: nbody(
+                [1.0, 0.1], orbits=[Orbit(a=1.0, primary="barycenter")], names=["Sun", "Jupiter"], t_end=1.0
+            ),
+            "did you mean 'barycentric'",
+        ),
         (lambda: nbody([1.0, 0.1], orbits=[Orbit(a=[1.0, 2.0])], t_end=1.0), "has arrays"),
         (lambda: nbody([1.0, 0.1], orbits=[Orbit(a=1.0)], names=["a"], t_end=1.0), "2 different names"),
         (

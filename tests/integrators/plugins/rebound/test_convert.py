@@ -90,6 +90,9 @@ def test_forces_that_are_added():
     [
         (lambda s: setattr(s, "gravity", "tree"), "its gravity is 'tree'"),
         (lambda s: setattr(s, "collision", "direct"), "it looks for collisions"),
+        (lambda s: setattr(s, "boundary", "open"), "it has a boundary .'open'."),
+        (lambda s: setattr(s, "N_ghost_y", 1), "it has ghost boxes .N_ghost_y=1."),
+        (lambda s: setattr(s, "OMEGA", 1.0), "its frame rotates .OMEGA=1.0., as SEI's does"),
         (lambda s: setattr(s, "testparticle_type", 1), "its test particles pull"),
         (lambda s: setattr(s.particles[1], "m", 0.0), "must be the last ones"),
         (lambda s: setattr(s, "additional_forces", lambda s: None), "additional_forces.* again as forces="),
