@@ -75,7 +75,7 @@ def test_time_and_state_belong_together_after_a_failure(
 
 def _left(problem: problems.Problem, y: np.ndarray) -> float:
     """Return how long it still is to the pole, as a state says."""
-    return 1.0 / y[0] if problem is ESCAPE else max(y[0], 0.0) ** -0.5
+    return 1.0 / y[0] if problem is ESCAPE else max(y[0], 1e-300) ** -0.5
 
 
 def _stepped(problem: problems.Problem, method: MethodBase, t: float) -> np.ndarray:
