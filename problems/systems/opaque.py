@@ -201,9 +201,9 @@ class Opaque(System):
 
     def not_compiled(self, error: Exception) -> InputError | None:
         """Return why numba does not compile f, in a sentence; ``None`` for an error of another kind."""
-        import numba.core.errors  # has been imported by who compiled f
+        from numba import NumbaError  # has been imported by who compiled f
 
-        if not isinstance(error, numba.core.errors.NumbaError):
+        if not isinstance(error, NumbaError):
             return None
         said = str(error)
         if "complex128" in said:

@@ -9,6 +9,7 @@ ROOM = 3 * POINTS  # for marks and zeros, of which a point has three at most
 TINY = 2.0**-1000  # a sign without a size
 NOTED = 2  # `Search.due` of an event that has happened at this time, and does not again
 CACHED = 32  # states of a step that are remembered
+NODES = 8  # of Gauss's quadrature, for a gamma_s that stages do not tell; see `series`
 
 # What is looked at: the step that is solved, what of it there is up to a time, the start alone.
 WHOLE, PART, START = range(3)

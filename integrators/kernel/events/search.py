@@ -16,6 +16,7 @@ from integrators.kernel.events.memory import (
     FINE,
     FINEST,
     FULL,
+    NODES,
     NOTED,
     PART,
     RAISED,
@@ -27,7 +28,6 @@ from integrators.kernel.events.memory import (
     WHOLE,
     Search,
 )
-from integrators.kernel.events.series import NODES
 from integrators.kernel.native.memory import aligned
 from integrators.protocol import Array, Status, UserError
 

@@ -7,12 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from integrators.kernel.engines import triangular
+from integrators.kernel.implicit.memory import FACTORIZE
 from integrators.kernel.native.memory import aligned
 
 Complex = NDArray[np.complex128]
-
-FACTORIZE, SOLVE = range(2)
-"""What is asked of the function at `Factors.address`."""
 
 DENSE = 0.3  # part of the entries that are stored from which a matrix is treated as dense
 

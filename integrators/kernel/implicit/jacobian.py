@@ -1,8 +1,7 @@
 """The Jacobian at a state, entry by entry, and the factors of the corrections' matrices."""
 
-from integrators.kernel.implicit.factors import FACTORIZE, SOLVE
 from integrators.kernel.implicit.linear import factor, solve
-from integrators.kernel.implicit.memory import Corrections
+from integrators.kernel.implicit.memory import FACTORIZE, SOLVE, Corrections
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.lanes import fma

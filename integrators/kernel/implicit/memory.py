@@ -5,6 +5,9 @@ from integrators.kernel.native.memory import Array, Integer, Memory, Pointer, Re
 NEWTON, BLENDED = range(2)
 """How corrections are computed."""
 
+FACTORIZE, SOLVE = range(2)
+"""What is asked of the function at `Corrections.factors`."""
+
 
 class Corrections(Memory):
     """The memory of a solver for the steps of one context: degree s, R rows, p pairs of eigenvalues of X_s.

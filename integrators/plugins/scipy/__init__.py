@@ -170,8 +170,11 @@ class HBVM(OdeSolver):
 
         try:
             return NativeSteps(self, compiled, k=k, s=self.s, h=h, first_step=first_step, every=every)
-        except NumbaError as error:
-            reason = str(error).strip().splitlines()[0]
+        except (NumbaError, InputError) as error:
+            said = error if isinstance(error, NumbaError) else error.__cause__
+            if not isinstance(said, NumbaError):
+                raise
+            reason = str(said).strip().splitlines()[0]
             message = f"{fun!r} cannot be compiled for an array of {self.n} numbers: {reason}"
             if compiled is fun or getattr(compiled.system, "in_place", False):
                 raise InputError(message) from error

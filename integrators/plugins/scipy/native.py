@@ -50,8 +50,8 @@ class NativeSteps:
 
     Raises
     ------
-    numba.NumbaError
-        If a numba function cannot be compiled for arrays of numbers.
+    problems.errors.InputError
+        If a numba function cannot be compiled for arrays of numbers; its cause is then a `numba.NumbaError`.
     """
 
     def __init__(

@@ -19,6 +19,7 @@ from integrators.protocol import Status
 from problems import InputError, Opaque, Problem, VectorField, targets
 
 MU = 5.0
+NOISE = 12  # evaluations by adaptive steps for the noise of a field that is called: two lines of k = 6 points
 METHODS = [
     HBVM(k=6, s=4, h=0.05),
     HBVM(k=6, s=4, tol=1e-9, solver="fixed_point"),
@@ -69,7 +70,9 @@ def test_every_way_of_writing_gives_the_traced_solution(written, method):
     assert foreign.stats.extra["field"] == (
         "numba function" if "numba" in written else "Python function, slow"
     )
-    assert foreign.stats.evaluations == traced.stats.evaluations or not isinstance(method, HBVM)
+    if isinstance(method, HBVM):
+        noise = 0 if method.h else NOISE
+        assert foreign.stats.evaluations == traced.stats.evaluations + noise
 
 
 def test_jacobians_are_taken_by_differences():
@@ -124,16 +127,19 @@ def test_the_time_is_the_stages_own():
     assert abs(made.y[0, 0] - math.sin(-3.0)) < 1e-14  # measured 2.8e-17
 
 
-@pytest.mark.parametrize("field", [lambda t, y: [math.sqrt(1 - t)], lambda t, y: [1 / (y[0] < 0.5)]])
-def test_where_a_function_is_not_defined_is_a_status_with_the_time(field):
+@pytest.mark.parametrize(
+    ("field", "what"),
+    [
+        (lambda t, y: [math.sqrt(1 - t)], ". There a function of yours raised ValueError (math domain error)."),
+        (lambda t, y: [1 / (y[0] < 0.5)], ": dy[0]/dt is inf at t = 0.5."),
+    ],
+    ids=["a root", "a division of NumPy's"],
+)
+def test_where_a_function_is_not_defined_is_a_status_with_the_time(field, what):
     problem = Problem(Opaque(field, dim=1, name="ends"), y0=[0.0], t_end=9.0)
     made = integrate(problem, HBVM(k=4, s=2, h=0.01), sample="steps")
     assert made.status is Status.NOT_FINITE
-    sentence = f"the vector field is not finite in the step from t = {made.t_stop!r}."
-    assert made.reason in (
-        sentence,
-        f"{sentence} There a function of yours raised ValueError (math domain error).",
-    )
+    assert made.reason == f"the vector field is not finite in the step from t = {made.t_stop!r}{what}"
     assert 0.4 < made.t_stop < 2.1
     assert np.isfinite(made.y).all()
     assert made.t[-1] == made.t_stop
