@@ -208,6 +208,9 @@ def measure_on_line(ctx, state, end, start, h, part, units, noise):
             way += copysign(LEAST_WAY * abs(state[i]), way if way != 0.0 else h)
             put(scratch.old_stages, offset(ctx, chunk) + lanes * d, splat8(state[i]) + c * splat8(way))
     for d in range(rows):
+        j = 8 * (d // 4) + 4 + d % 4 if ctx.second else d
+        if state[j] == 0.0 and end[j] == 0.0:
+            continue  # what stays 0 is not rounded: the field may not be defined, or another one, beside it
         left = units * UNIT / ctx.blocks.weights[d]
         for i in range(ctx.k):
             above = GOLDEN * (i + 1) * (d + 1) % 1.0 < 0.5

@@ -19,6 +19,7 @@ from integrators.protocol import Status
 from problems import InputError, Opaque, Problem, VectorField, targets
 
 MU = 5.0
+RAISED = "a function of yours raised ValueError (math domain error)"
 NOISE = 12  # evaluations by adaptive steps for the noise of a field that is called: two lines of k = 6 points
 METHODS = [
     HBVM(k=6, s=4, h=0.05),
@@ -130,7 +131,7 @@ def test_the_time_is_the_stages_own():
 @pytest.mark.parametrize(
     ("field", "what"),
     [
-        (lambda t, y: [math.sqrt(1 - t)], ". There a function of yours raised ValueError (math domain error)."),
+        (lambda t, y: [math.sqrt(1 - t)], f". There {RAISED}."),
         (lambda t, y: [1 / (y[0] < 0.5)], ": dy[0]/dt is inf at t = 0.5."),
     ],
     ids=["a root", "a division of NumPy's"],

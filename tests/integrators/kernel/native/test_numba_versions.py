@@ -64,9 +64,7 @@ def test_a_numba_that_can_do_nothing_gives_a_sentence(tmp_path):
 
 def test_a_wrong_number_is_not_believed(tmp_path):
     wrong = "import llvmlite.binding as llvm\nfrom integrators.kernel.native import machine as native\n"
-    wrong += (
-        "native.entry, kept = (lambda *a: kept(*a).replace('ret i64 %z', 'ret i64 17')), native.entry\n"
-    )
+    wrong += "native.entry, kept = (lambda *a: kept(*a).replace('ret i64 %z', 'ret i64 17')), native.entry\n"
     done = run(tmp_path, NEWER + wrong + "from integrators.kernel.native import jit")
     assert done.returncode == 1
     assert "a sum of 18 is 17" in done.stderr.strip().splitlines()[-1]
