@@ -15,13 +15,13 @@ if not hasattr(problems, "VectorField"):  # a file of the user
     )
 
 from integrators import registry
-from integrators.ensemble import Solutions, load
 from integrators.protocol import MethodBase, Samples, Stats, Status
 from integrators.running.integrate import integrate
 from integrators.running.many import integrate_many
 from integrators.running.run import Run, start
 from integrators.running.watch import Progress
-from integrators.solution import Solution
+from integrators.solution.ensemble import Solutions, load
+from integrators.solution.record import Solution
 
 if TYPE_CHECKING:
     from integrators.coefficients.order import order_of as order_of

@@ -28,7 +28,7 @@ from hbvm_bench.campaign.file import Campaign, chosen, name_of, text_of
 from hbvm_bench.campaign.spec import Spec, file_of, parse_spec
 from hbvm_bench.campaign.sweep import fill
 from hbvm_bench.reference import solutions
-from integrators.plain import packed_problem, unpacked_problem
+from integrators.solution.plain import packed_problem, unpacked_problem
 from problems.checks import Arguments
 from problems.errors import InputError, shown, unknown
 from problems.problem import Problem

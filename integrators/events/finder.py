@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from integrators.events.event import Event
 from integrators.protocol import Actions, Array, Events, MethodBase, Status, offers
-from integrators.solution import Occurrences
+from integrators.solution.occurrences import Occurrences
 from problems.errors import InputError
 from problems.problem import Problem
 

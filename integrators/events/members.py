@@ -19,7 +19,7 @@ from integrators.protocol import (
     offers,
     telling,
 )
-from integrators.solution import Occurrences
+from integrators.solution.occurrences import Occurrences
 
 Member = tuple[Trajectories, dict[str, Occurrences]]
 

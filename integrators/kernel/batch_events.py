@@ -25,7 +25,7 @@ from integrators.kernel.pace import FEWEST, Pace
 from integrators.kernel.stepper import CHUNK_WITH_EVENTS, HBVMStepper, accumulated
 from integrators.protocol import Array, Samples, Status
 from integrators.refusals import check_batch, check_times
-from integrators.solution import Occurrences
+from integrators.solution.occurrences import Occurrences
 
 HITS = 128  # of a step of a lane, at most; a trajectory with more leaves it
 

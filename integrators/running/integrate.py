@@ -36,7 +36,7 @@ from integrators.refusals import check_interval, check_times
 from integrators.running.digits import check_digits, pairs
 from integrators.running.variations import follow
 from integrators.running.watch import SOON, Bar, Report, Watch, both, identity, read
-from integrators.solution import Solution, solution_of
+from integrators.solution.record import Solution, solution_of
 from problems import limits
 from problems.analysis.tables import check_tables
 from problems.checks import File, Must, Word, checked_arguments

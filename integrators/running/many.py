@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from integrators import registry
-from integrators.ensemble import Solutions
 from integrators.events.event import Event, named
 from integrators.events.finder import started_with_events
 from integrators.options import Count
@@ -42,6 +41,7 @@ from integrators.running.pieces import (
 from integrators.running.variations import check as check_vectors
 from integrators.running.variations import directions_of_each
 from integrators.running.watch import SOON, Bar, Progress, Report, Watch, identity, read
+from integrators.solution.ensemble import Solutions
 from problems.analysis.tables import check_tables
 from problems.checks import NOTHING, File, Named, Word, at_least, checked_arguments
 from problems.errors import InputError, shown, unknown

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from integrators.ensemble import Solutions
 from integrators.events.event import Event
 from integrators.events.finder import started_with_events
 from integrators.events.members import follow, own_times
@@ -35,8 +34,9 @@ from integrators.protocol import (
 )
 from integrators.reduce import Reducer
 from integrators.running.integrate import prepared
-from integrators.segments import Segments
-from integrators.solution import Occurrences
+from integrators.solution.ensemble import Solutions
+from integrators.solution.occurrences import Occurrences
+from integrators.solution.segments import Segments
 from problems.errors import InputError, shown
 from problems.problem import Problem
 

@@ -23,7 +23,8 @@ from integrators.protocol import (
 from integrators.refusals import check_interval, check_parameters, check_state, check_times
 from integrators.running.digits import as_pairs, check_digits, pairs
 from integrators.running.integrate import prepared, started, wanted_events
-from integrators.solution import Occurrences, as_mpmath
+from integrators.solution.exports import as_mpmath
+from integrators.solution.occurrences import Occurrences
 from problems.analysis import invariants
 from problems.analysis.tables import check_tables
 from problems.checks import checked_arguments

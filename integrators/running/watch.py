@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from integrators.protocol import Array, MethodBase, Stats
-from integrators.solution import write_whole
+from integrators.solution.files import write_whole
 from problems import targets
 from problems.errors import InputError, shown
 from problems.problem import Problem

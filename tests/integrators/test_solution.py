@@ -289,7 +289,7 @@ def test_many_times_between_samples_take_few_starts(back, monkeypatch):
     solution = integrate(problem, HBVM(), times)
     asked = back * np.random.default_rng(0).uniform(0.0, 300.0, 5000)
     asked[:3] = times[[0, 77, -1]]
-    kind, starts = type(solution._program), []
+    kind, starts = type(solution._interpolant.program), []
     start = kind.start
 
     def counted(self, *given):

@@ -105,7 +105,7 @@ def test_a_full_disk_is_told_with_the_solution(tmp_path, monkeypatch):
     def full(handle, *_, **__):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("integrators.solution.os.fdopen", full)
+    monkeypatch.setattr("integrators.solution.files.os.fdopen", full)
     found = integrate(problem, Gauss(s=2, h=0.1), [1.0], checkpoint=path, every_seconds=0.0)
     assert found.status is Status.FINISHED
     assert "No space left on device" in found.warnings[0]

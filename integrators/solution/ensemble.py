@@ -1,6 +1,5 @@
 """Many trajectories of one problem, each of which is available as a solution."""
 
-import json
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -10,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from integrators import solution
 from integrators.caveats import (
     LOOKED_AT,
     expected,
@@ -20,7 +18,19 @@ from integrators.caveats import (
     of_tables,
     warnings,
 )
-from integrators.plain import (
+from integrators.protocol import Array, MethodBase, Stats, Status, Trajectories
+from integrators.solution.exports import library
+from integrators.solution.files import (
+    check_extra,
+    compilation,
+    fields,
+    occurrences,
+    of_type,
+    read_file,
+    write,
+)
+from integrators.solution.occurrences import Occurrences
+from integrators.solution.plain import (
     doubles,
     packed,
     packed_method,
@@ -28,16 +38,14 @@ from integrators.plain import (
     unpacked,
     unpacked_method,
 )
-from integrators.protocol import Array, MethodBase, Stats, Status, Trajectories
-from integrators.segments import Segments
-from integrators.solution import Occurrences, Solution, library, of_type, write_whole
+from integrators.solution.record import Solution
+from integrators.solution.segments import Segments
 from problems.analysis import deviations, invariants
 from problems.checks import File, checked_arguments, readable
 from problems.errors import printable, shown
 from problems.problem import Problem
 
-KIND = "ensemble"
-FORMAT = 1  # of files
+KIND = "ensemble"  # of files
 
 
 @readable
@@ -359,13 +367,13 @@ class Solutions(Trajectories):
         arrays: dict[str, NDArray[Any]] = {name: getattr(self, name) for name in _ARRAYS}
         names = list(dict.fromkeys(name for events in self.events for name in events))
         for name in names:
-            occurrences = [events.get(name) for events in self.events]
-            lengths = np.array([0 if hits is None else len(hits) for hits in occurrences], dtype=np.int64)
+            found = [events.get(name) for events in self.events]
+            lengths = np.array([0 if hits is None else len(hits) for hits in found], dtype=np.int64)
             arrays[f"event_counts:{name}"] = lengths
-            known = next(hits for hits in occurrences if hits is not None)
+            known = next(hits for hits in found if hits is not None)
             more = [key for key in ("after", "par") if getattr(known, key) is not None]
             for key in ("t", "y", "direction", *more):
-                parts = [getattr(hits, key) for hits in occurrences if hits is not None]
+                parts = [getattr(hits, key) for hits in found if hits is not None]
                 arrays[f"event_{key}:{name}"] = np.concatenate(parts)
         if self.variations is not None and self.directions is not None:
             arrays["variations"] = self.variations
@@ -373,7 +381,6 @@ class Solutions(Trajectories):
         arrays |= {f"reduced:{name}": np.asarray(values) for name, values in self.reduced.items()}
         words = {
             "kind": KIND,
-            "format": FORMAT,
             "problem": packed_problem(self.problem, arrays),
             "method": packed_method(self.method, arrays),
             "status": list(map(str, self.status)),
@@ -384,8 +391,7 @@ class Solutions(Trajectories):
             "compile_seconds": self.compile_seconds,
             "from_cache": self.from_cache,
         }
-        arrays["words"] = np.frombuffer(json.dumps(words).encode(), dtype=np.uint8)
-        write_whole(Path(path), lambda file: np.savez(file, **arrays))  # pyright: ignore[reportArgumentType]
+        write(Path(path), words, arrays)
 
 
 _ARRAYS = ("t", "y", "starts", "par", "t_stop", "steps")
@@ -417,7 +423,8 @@ def load(path: File, problem: Problem | None = None) -> Any:
     >>> load(path).method
     Gauss(s=2, h=0.1)
     """
-    return solution.read_file(path, problem, {None: solution.from_file, KIND: _from_file})
+    readers = {None: lambda *of: Solution(**fields(*of)), KIND: _from_file}
+    return read_file(path, problem, readers)
 
 
 def _from_file(words: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]], problem: Problem) -> Solutions:
@@ -430,7 +437,7 @@ def _from_file(words: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]], pro
     steps = doubles(arrays["steps"], (n,), "steps")
     extra = {int(i): of_type(dict, value) for i, value in unpacked(words["extra"], arrays).items()}
     for values in extra.values():
-        solution.check_extra(values)
+        check_extra(values)
     return Solutions(
         t=doubles(t, (m,) if np.ndim(t) == 1 else (n, m), "t"),
         y=doubles(arrays["y"], (n, m, dim), "y"),
@@ -440,8 +447,7 @@ def _from_file(words: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]], pro
         steps=steps.astype(np.int64),
         starts=doubles(arrays["starts"], (n, dim), "starts"),
         par=doubles(arrays["par"], (n, problem.system.n_par), "par"),
-        compile_seconds=of_type(float, words["compile_seconds"]),
-        from_cache=None if words["from_cache"] is None else of_type(bool, words["from_cache"]),
+        **compilation(words),
         problem=problem,
         method=unpacked_method(words["method"], arrays),
         events=[] if words["events"] is None else _events(words["events"], arrays, n, problem),
@@ -479,7 +485,7 @@ def _events(
         counts = arrays[f"event_counts:{name}"]
         if counts.dtype.kind != "i" or counts.shape != (n,) or counts.min(initial=0) < 0:
             raise TypeError(f"the counts of {shown(name)} are not as many as the trajectories")
-        whole = solution.occurrences(name, arrays, problem)
+        whole = occurrences(name, arrays, problem)
         if counts.sum() != len(whole):
             raise TypeError(f"the times of {shown(name)} are not as many as its counts")
         ends = np.cumsum(counts)

@@ -1,15 +1,10 @@
 """The solution of an initial value problem: samples, statistics and warnings."""
 
-import json
-import os
-import tempfile
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
-from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,63 +18,20 @@ from integrators.caveats import (
     of_tables,
     warnings,
 )
-from integrators.plain import (
-    doubles,
-    packed,
-    packed_method,
-    packed_problem,
-    unpacked,
-    unpacked_method,
-    unpacked_problem,
-)
-from integrators.protocol import Array, DoubleDouble, MethodBase, Program, Stats, Status
-from integrators.segments import Segments
+from integrators.protocol import Array, MethodBase, Stats, Status
+from integrators.solution.exports import as_mpmath, library
+from integrators.solution.files import AS_THEY_ARE, write
+from integrators.solution.interpolation import Interpolant
+from integrators.solution.occurrences import Occurrences
+from integrators.solution.plain import packed, packed_method, packed_problem
+from integrators.solution.segments import Segments
 from problems.analysis import deviations, invariants
 from problems.bodies import Elements, elements
 from problems.checks import File, checked_arguments, readable
 from problems.double_double import DD
-from problems.errors import InputError, MissingLibraryError, printable, shown
+from problems.errors import InputError, printable
 from problems.problem import Problem
 from problems.quantities import plain_numbers
-
-FORMAT = 1  # of files
-ROUNDING = 1e-14  # relative to its largest size, how far a component may be from a sample that is met
-EXACT_BITS = 2200  # of the sum of any two doubles
-FAR, MOST_AT_ONCE = 4, 1024  # intervals between samples: not gone through for nothing, and at a time
-
-
-@dataclass(frozen=True, eq=False)
-class Occurrences:
-    """Occurrences of one event.
-
-    Attributes
-    ----------
-    t : ndarray, shape (n,)
-        Times, in the order of integration.
-    y : ndarray, shape (n, dim)
-        States at these times, each the end of a partial step.
-    direction : ndarray of int, shape (n,)
-        1 where g increases, -1 where it decreases, 0 where it touches zero without a change of sign.
-    after : ndarray, shape (n, dim), optional
-        The states after the event's action; ``None`` for an event without one.
-    par : ndarray, shape (n, n_par), optional
-        The parameters from then on, as `System.unpack` takes them; ``None`` for an event without an action.
-    """
-
-    t: Array
-    y: Array
-    direction: NDArray[np.int64]
-    after: Array | None = None
-    par: Array | None = None
-
-    def __len__(self) -> int:
-        return self.t.size
-
-    def select(self, which: NDArray[Any]) -> "Occurrences":
-        """Return some of them, by a mask or indices."""
-        after = None if self.after is None else self.after[which]
-        par = None if self.par is None else self.par[which]
-        return Occurrences(self.t[which], self.y[which], self.direction[which], after, par)
 
 
 @readable
@@ -171,7 +123,7 @@ class Solution:
         problems.errors.InputError
             For times outside the interval, or if the integration from the previous sample fails.
         """
-        return self._at(t)[..., : self.problem.system.dim]
+        return self._interpolant(plain_numbers("t", t))[..., : self.problem.system.dim]
 
     def variations_at(self, t: ArrayLike) -> Array:
         """Return the variations at arbitrary times within the computed interval.
@@ -200,7 +152,7 @@ class Solution:
         """
         if self.directions is None:
             raise InputError("the solution has no variations; give integrate(..., variations=).")
-        rows = self._at(t)[..., self.problem.system.dim :]
+        rows = self._interpolant(plain_numbers("t", t))[..., self.problem.system.dim :]
         return rows.reshape(*rows.shape[:-1], *self.directions[0].shape)
 
     def pairs_at(self, t: ArrayLike) -> Array:
@@ -221,7 +173,7 @@ class Solution:
             As for states; and for a solution that has doubles only.
         """
         self._check_digits()
-        rows = self._at(t)
+        rows = self._interpolant(plain_numbers("t", t))
         return np.stack(np.split(rows, 2, axis=-1), axis=-1)
 
     def _check_digits(self) -> None:
@@ -230,89 +182,24 @@ class Solution:
                 "the solution has doubles only; integrate with Gauss(s=, h=, precision='double-double')."
             )
 
-    def _at(self, t: ArrayLike) -> Array:
-        """Return the states at times with, where there are any, variations or low parts; shape (..., m)."""
-        times, dim = plain_numbers("t", t), self.problem.system.dim
-        before = self.t.size == 0 or self.t[0] != self.problem.t0
-        at = np.concatenate([[self.problem.t0][: int(before)], self.t])
-        states = np.concatenate([self.problem.y0[np.newaxis][: int(before)], self.y])
+    @cached_property
+    def _interpolant(self) -> Interpolant:
+        problem, end = self.problem, self.t_stop
+        before = slice(None if self.t.size == 0 or self.t[0] != problem.t0 else 0)  # the start is no sample
+        t, rows = [np.array([problem.t0])[before], self.t], [[problem.y0[np.newaxis][before], self.y]]
         if self.directions is not None and self.variations is not None:
-            first = self.directions[0][np.newaxis][: int(before)]
-            vectors = np.concatenate([first, self.variations])
-            states = np.concatenate([states, vectors.reshape(len(vectors), -1)], axis=1)
+            vectors = [self.directions[0][np.newaxis][before], self.variations]
+            rows.append([part.reshape(len(part), self.directions[0].size) for part in vectors])
         if self.low is not None and self.start is not None:
-            first = self.start[np.newaxis, :, 1][: int(before)]
-            states = np.concatenate([states, np.concatenate([first, self.low])], axis=1)
-        end = float(at[-1])
-        segments = self._segments
-        if segments.t.size > 1:  # states that events have made, in between; at one time the sample counts
-            at, states = np.append(at, segments.t[1:]), np.concatenate([states, segments.y[1:]])
-            _, order = np.unique(segments.sign * at, return_index=True)
-            at, states = at[order], states[order]
-        segment = segments.places(at, states[:, :dim])
-        if not self.status.failed and (self.t_stop - end) * (end - self.problem.t0) >= 0.0:
-            end = self.t_stop  # a terminal event, after the last sample
-        sign = 1.0 if end >= self.problem.t0 else -1.0
-        wanted, places = np.unique(sign * times, return_inverse=True)
-        inside = (wanted >= sign * at[0]) & (wanted <= sign * end)
-        if not inside.all():
-            wrong = float(sign * wanted[int(np.argmin(inside))])
-            raise InputError(
-                f"t={wrong!r} is not between t = {float(at[0])!r} and {end!r}, which the solution covers."
-            )
-        states_ = np.empty((wanted.size, states.shape[1]))
-        sample = np.searchsorted(sign * at, wanted, side="right") - 1
-        close = max(ROUNDING, self.method.options(defaults=True).get("tol") or 0.0) * np.abs(
-            states[:, :dim]
-        ).max(axis=0)
-        intervals, first, count = np.unique(sample), 0, 1
-        while first < intervals.size:
-            group = intervals[first : first + count]
-            far = np.flatnonzero(np.diff(group) > FAR)
-            group = group[: far[0] + 1] if far.size else group
-            mine = np.flatnonzero((sample >= group[0]) & (sample <= group[-1]))
-            ends = sign * at[group]
-            goals = np.union1d(wanted[mine], ends[1:])
-            goals = goals[goals > ends[0]]
-            reached = states[:0]
-            if goals.size:
-                start = float(at[group[0]])
-                stepper = self._begun(states[group[0]], start, segments.par[segment[group[0]]])
-                if self.directions is not None:
-                    stepper.follow(states[group[0], dim:].reshape(dim, -1), self.directions[1])
-                advanced = stepper.advance(sign * goals)
-                if advanced.status.failed and group.size > 1:
-                    count = 1
-                    continue
-                if advanced.status.failed:
-                    raise InputError(f"{self.method!r} does not go on from t = {start!r}: {advanced.reason}")
-                reached = advanced.y
-                if self.directions is not None:
-                    reached = np.concatenate([reached, stepper.variations.reshape(len(reached), -1)], axis=1)
-                if self.low is not None:
-                    reached = np.concatenate([reached, stepper.low], axis=1)
-            goals, reached = np.append(ends[0], goals), np.concatenate([states[group[:1]], reached])
-            # As long as the samples are met the method goes on from where it is, else from them.
-            met = (np.abs((reached[np.searchsorted(goals, ends)] - states[group])[:, :dim]) <= close).all(
-                axis=1
-            )
-            met &= segment[group] == segment[group[0]]
-            done = group.size if met.all() else int(np.argmin(met))
-            mine = mine[sample[mine] <= group[done - 1]]
-            states_[mine] = reached[np.searchsorted(goals, wanted[mine])]
-            first += done
-            count = min(2 * count, MOST_AT_ONCE) if done == group.size else done
-        own = wanted == sign * at[sample]
-        states_[own] = states[sample[own]]
-        return states_[places.reshape(times.shape)]
-
-    def _begun(self, row: Array, t: float, par: Array) -> Any:
-        """Return a stepper at a state, which may have low parts behind it."""
-        dim, program = self.problem.system.dim, self._program
-        if self.low is None:
-            return program.start(row[:dim], par, t)
-        pairs = np.stack([row[:dim], row[dim:]], axis=1)
-        return cast("DoubleDouble", program).start_pairs(pairs, par, t)
+            rows.append([self.start[np.newaxis, :, 1][before], self.low])
+        last = float(np.concatenate(t)[-1])
+        if self.status.failed or (end - last) * (last - problem.t0) < 0.0:
+            end = last  # else a terminal event may lie after the last sample
+        return Interpolant.from_samples(
+            problem, self.method, np.concatenate(t), np.hstack([np.concatenate(parts) for parts in rows]),
+            end, self._segments, tangent=None if self.directions is None else self.directions[1],
+            pairs=self.low is not None,
+        )  # fmt: skip
 
     @property
     def _acted(self) -> bool:
@@ -325,12 +212,8 @@ class Solution:
         problem, sign = self.problem, 1.0 if self.t_stop >= self.problem.t0 else -1.0
         return Segments.from_events(problem.t0, problem.y0, problem.par, self.events, sign)
 
-    @cached_property
-    def _program(self) -> Program:
-        return self.method.compile(self.problem.system)
-
     def __getstate__(self) -> dict[str, Any]:
-        return {key: value for key, value in vars(self).items() if key != "_program"}
+        return {key: value for key, value in vars(self).items() if key != "_interpolant"}
 
     @property
     def q(self) -> Array | None:
@@ -573,7 +456,6 @@ class Solution:
                 f"event_{key}:{name}": value for key, value in vars(happened).items() if value is not None
             }
         words = {
-            "format": FORMAT,
             "problem": packed_problem(self.problem, arrays),
             "method": packed_method(self.method, arrays),
             "stats": packed(asdict(self.stats), arrays),
@@ -581,62 +463,7 @@ class Solution:
             "status": str(self.status),
             "error": None if self.error is None else [type(self.error).__name__, str(self.error)],
         }
-        words |= {key: getattr(self, key) for key in _AS_THEY_ARE}
-        arrays["words"] = np.frombuffer(json.dumps(words).encode(), dtype=np.uint8)
-        write_whole(
-            Path(path),
-            lambda file: np.savez(file, **arrays),  # pyright: ignore[reportArgumentType]
-        )
-
-
-def as_mpmath(pairs: Array) -> NDArray[Any]:
-    """Return pairs, shape (..., 2), as numbers of mpmath, exactly."""
-    import mpmath  # for those who need it
-
-    numbers = np.empty(pairs.shape[:-1], dtype=object)
-    with mpmath.workprec(EXACT_BITS):
-        for place in np.ndindex(numbers.shape):
-            high, low = pairs[place].tolist()
-            numbers[place] = mpmath.mpf(high) + low
-    return numbers
-
-
-_AS_THEY_ARE = ("reason", "t_stop", "compile_seconds", "from_cache")
-
-
-def read_file(path: Any, problem: Any, readers: Mapping[str | None, Any]) -> Any:
-    """Return what a file holds, by the reader of its kind: ``reader(words, arrays, problem)``.
-
-    Raises
-    ------
-    problems.errors.InputError
-        For a file that is not there, is damaged, or is none of these.
-    """
-    if not isinstance(problem, Problem | None):
-        raise InputError(f"problem={shown(problem)} of load must be the Problem that was integrated.")
-    try:
-        with Path(path).open("rb") as handle, np.load(handle, allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
-        words = json.loads(arrays["words"].tobytes())
-        if words["format"] != FORMAT:
-            raise InputError(f"{path} is of format {words['format']}, which this version does not read.")
-        problem_ = unpacked_problem(words["problem"], arrays) or problem
-        if problem_ is None:
-            raise InputError(
-                f"the field of the solution in {path} is code, which the file does not hold; "
-                "load it with problem=, the one that was integrated."
-            )
-        return readers[words.get("kind")](words, arrays, problem_)
-    except (InputError, FileNotFoundError) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"there is no file {shown(str(path))}; give one that Solution.save wrote.") from None
-    except Exception as error:  # whatever reading a file of any content raises
-        why = f"{type(error).__name__}: {shown(str(error))}"
-        raise InputError(
-            f"{shown(str(path))} is not a solution, or is damaged ({why}); "
-            "give a file that Solution.save wrote."
-        ) from None
+        write(Path(path), words | {key: getattr(self, key) for key in AS_THEY_ARE}, arrays)
 
 
 if TYPE_CHECKING:
@@ -648,133 +475,3 @@ else:
         solution = object.__new__(Solution)
         vars(solution).update(fields)
         return solution
-
-
-def from_file(words: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]], problem: Problem) -> Solution:
-    """Return the solution that words and arrays of a file tell of."""
-    dim, n = problem.system.dim, np.size(arrays["t"])
-    return Solution(
-        t=doubles(arrays["t"], (n,), "t"),
-        y=doubles(arrays["y"], (n, dim), "y"),
-        status=Status(words["status"]),
-        stats=_stats(unpacked(words["stats"], arrays)),
-        problem=problem,
-        method=unpacked_method(words["method"], arrays),
-        events={name: occurrences(name, arrays, problem) for name in words["events"]},
-        variations=_variations(arrays, n, dim),
-        directions=_directions(arrays, dim, problem.par.size),
-        **_digits(arrays, n, dim),
-        error=None if words["error"] is None else RuntimeError(": ".join(words["error"])),
-        reason=of_type(str, words["reason"]),
-        t_stop=of_type(float, words["t_stop"]),
-        compile_seconds=of_type(float, words["compile_seconds"]),
-        from_cache=None if words["from_cache"] is None else of_type(bool, words["from_cache"]),
-    )
-
-
-def of_type(kind: type[Any], value: Any) -> Any:
-    """Return a stored value of a type; whole numbers are numbers too."""
-    if type(value) is not kind and not (kind is float and type(value) is int):
-        raise TypeError(f"{shown(value)} is no {kind.__name__}")
-    return kind(value)
-
-
-def _stats(stored: Any) -> Stats:
-    stats = Stats(**stored)
-    counts = (stats.rejections, stats.evaluations, stats.iterations)
-    for count in (of_type(int, stats.steps), *(n for n in counts if n is not None)):
-        of_type(int, count)
-    if stats.solver is not None:
-        of_type(str, stats.solver)
-    check_extra(stats.extra)
-    return stats
-
-
-def check_extra(extra: Any) -> None:
-    """Refuse stored ``extra`` of a trajectory whose parts that warnings are made of have other types."""
-    of_type(dict, extra)
-    for t, h in extra.get("kinks", ()):  # which `Solution.warnings` reads, as it does the next
-        of_type(float, t)
-        of_type(float, h)
-    for t, change, size in of_type(dict, extra.get("lost", {})).values():
-        for number in (t, change, size):
-            of_type(float, number)
-    of_type(str, extra.get("checkpoint", ""))
-    of_type(int, extra.get("implicit", {"steps": 0})["steps"])
-
-
-def occurrences(name: str, arrays: Mapping[str, NDArray[Any]], problem: Problem) -> Occurrences:
-    """Return where an event happened, from the arrays of a file."""
-    dim, n_par = problem.system.dim, problem.system.n_par
-    t, y, direction = (arrays[f"event_{key}:{of_type(str, name)}"] for key in ("t", "y", "direction"))
-    if direction.dtype.kind != "i" or direction.shape != t.shape:
-        raise TypeError(f"the directions of {shown(name)} are not as many as its times")
-    n = np.size(t)
-    after, par = arrays.get(f"event_after:{name}"), arrays.get(f"event_par:{name}")
-    return Occurrences(
-        doubles(t, (n,), "t"), doubles(y, (n, dim), "y"), direction.astype(np.int64),
-        None if after is None else doubles(after, (n, dim), "after"),
-        None if par is None else doubles(par, (n, n_par), "par"),
-    )  # fmt: skip
-
-
-def _digits(arrays: Mapping[str, NDArray[Any]], n: int, dim: int) -> dict[str, Array]:
-    """Return the low parts of states and the start in pairs, which a file has both or none of."""
-    if "low" not in arrays and "start" not in arrays:
-        return {}
-    if "variations" in arrays or "directions_state" in arrays:
-        raise TypeError("low parts and variations do not go together")
-    return {
-        "low": doubles(arrays["low"], (n, dim), "low"),
-        "start": doubles(arrays["start"], (dim, 2), "start"),
-    }
-
-
-def _variations(arrays: Mapping[str, NDArray[Any]], n: int, dim: int) -> Array | None:
-    vectors = arrays.get("variations")
-    return None if vectors is None else doubles(vectors, (n, dim, vectors.shape[-1]), "variations")
-
-
-def _directions(arrays: Mapping[str, NDArray[Any]], dim: int, n_par: int) -> tuple[Array, Array] | None:
-    state, parameters = arrays.get("directions_state"), arrays.get("directions_parameters")
-    if state is None or parameters is None:
-        return None
-    n = state.shape[-1]
-    return doubles(state, (dim, n), "directions"), doubles(parameters, (n_par, n), "directions")
-
-
-def write_whole(path: Path, write: Any) -> None:
-    """Write a file under another name and give it its own when it is complete.
-
-    Raises
-    ------
-    problems.errors.InputError
-        If that cannot be done.
-    """
-    temporary = None
-    try:
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".tmp")
-        with os.fdopen(handle, "wb") as file:
-            write(file)
-        Path(temporary).replace(path)
-    except OSError as error:
-        where = shown(str(path))
-        raise InputError(f"{where} cannot be written: {error.strerror}; give another path.") from None
-    finally:
-        if temporary is not None:
-            with suppress(OSError):
-                Path(temporary).unlink()
-
-
-def library(name: str) -> Any:
-    """Import an optional library that tables are made with.
-
-    Raises
-    ------
-    problems.errors.MissingLibraryError
-        If it is not installed.
-    """
-    try:
-        return import_module(name)
-    except ImportError:
-        raise MissingLibraryError(f"{name} is not installed; install it with: pip install {name}.") from None
