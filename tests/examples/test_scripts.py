@@ -83,9 +83,9 @@ def test_the_page_of_tasks_says_when_with_what_kernel_and_beside_what_load(monke
     ) in run_all.page()
 
 
-# Its reference is computed by two methods, half a minute of compiling (that of the tutorial is stored);
-# campaign.py starts seven processes; bodies.py compiles for 14 s, and XLA does in fit.py for 5.
-SLOW = {"own_campaign.py", "campaign.py", "bodies.py", "fit.py"}
+# What takes longest: references computed by two methods, XLA, many processes, runs of seconds with each library.
+SLOW = {"own_campaign.py", "campaign.py", "bodies.py", "fit.py", "radial_velocities.py", "long_runs.py"}
+SLOW |= {"scaling.py", "section.py", "lattice.py", "linkages.py", "star_cluster.py", "encounters.py"}
 
 
 @pytest.mark.parametrize(
