@@ -83,7 +83,7 @@ def test_the_page_of_tasks_says_when_with_what_kernel_and_beside_what_load(monke
     ) in run_all.page()
 
 
-# What takes longest: references computed by two methods, XLA, many processes, runs of seconds with each library.
+# What takes longest: two references, XLA, many processes, seconds with each library.
 SLOW = {"own_campaign.py", "campaign.py", "bodies.py", "fit.py", "radial_velocities.py", "long_runs.py"}
 SLOW |= {"scaling.py", "section.py", "lattice.py", "linkages.py", "star_cluster.py", "encounters.py"}
 
