@@ -8,13 +8,14 @@ from importlib.util import find_spec
 
 import heyoka as hy
 import numpy as np
-from side_by_side import Comparison
+from side_by_side import Comparison, tolerances
 
 import integrators
 import problems
 
 END, SKIP, ROUND = 500.0, 20.0, 0.5
 START = [1.0, 2.0, 20.0]
+TOLERANCES = (1e-14, 1e-11, 1e-9, 1e-7)
 KNOWN = 0.9056  # J. C. Sprott, Chaos and Time-Series Analysis, Oxford University Press 2003
 
 
@@ -24,17 +25,17 @@ def lorenz(y):
 
 
 @cache  # made once, as its users do
-def heyokas() -> hy.taylor_adaptive_dbl:
+def heyokas(tol: float) -> hy.taylor_adaptive_dbl:
     """Return heyoka's integrator of the equations and of three tangent vectors."""
     variables = hy.make_vars("x", "y", "z")
     equations = list(zip(variables, lorenz(variables), strict=True))
     system = hy.var_ode_sys(equations, hy.var_args.vars, order=1)
-    return hy.taylor_adaptive(system, np.array(START))
+    return hy.taylor_adaptive(system, np.array(START), tol=tol)
 
 
-def by_heyoka() -> np.ndarray:
+def by_heyoka(tol: float) -> np.ndarray:
     """Return the exponents; the vectors are made orthonormal again and again."""
-    ta = heyokas()
+    ta = heyokas(tol)
     ta.time, ta.state[:] = 0.0, [*START, *np.eye(3).ravel()]
     ta.propagate_until(SKIP)
     growth, rounds = np.zeros(3), round((END - SKIP) / ROUND)
@@ -48,7 +49,7 @@ def by_heyoka() -> np.ndarray:
 
 
 @cache
-def pynamicalsyss():
+def pynamicalsyss(tol: float):
     """Return the system of pynamicalsys, which compiles a field and its Jacobian by numba."""
     import numba
     from pynamicalsys import ContinuousDynamicalSystem
@@ -64,13 +65,13 @@ def pynamicalsyss():
     system = ContinuousDynamicalSystem(
         equations_of_motion=field, jacobian=jacobian, system_dimension=3, number_of_parameters=0
     )
-    system.integrator("rk45", atol=1e-10, rtol=1e-10)
+    system.integrator("rk45", atol=tol, rtol=tol)
     return system
 
 
-def by_pynamicalsys() -> np.ndarray:
+def by_pynamicalsys(tol: float) -> np.ndarray:
     """Return the exponents by pynamicalsys."""
-    return pynamicalsyss().lyapunov(START, END, transient_time=SKIP, parameters=np.empty(0))
+    return pynamicalsyss(tol).lyapunov(START, END, transient_time=SKIP, parameters=np.empty(0))
 
 
 def compare() -> Comparison:
@@ -81,10 +82,13 @@ def compare() -> Comparison:
     def error(found: np.ndarray) -> float:
         return max(abs(found[0] - KNOWN), abs(found.sum() + 41 / 3))
 
-    made.add("integrators.lyapunov", lambda: integrators.lyapunov(problem, skip=SKIP).exponents, error)
-    made.add("heyoka", by_heyoka, error)
+    def ours(tol: float) -> np.ndarray:
+        return integrators.lyapunov(problem, integrators.HBVM(tol=tol), skip=SKIP).exponents
+
+    made.add("integrators.lyapunov", tolerances(ours, *TOLERANCES), error)
+    made.add("heyoka", tolerances(by_heyoka, *TOLERANCES), error)
     if find_spec("pynamicalsys"):
-        made.add("pynamicalsys's RK45", by_pynamicalsys, error)
+        made.add("pynamicalsys's RK45", tolerances(by_pynamicalsys, *TOLERANCES), error)
     return made
 
 

@@ -1,8 +1,9 @@
 """Your own system, from its energy: a swinging Atwood machine; SciPy needs its equations by hand."""
 
+import numba
 import numpy as np
 from scipy.integrate import solve_ivp
-from side_by_side import Comparison
+from side_by_side import Comparison, settings, tolerances
 
 import integrators
 import problems
@@ -18,19 +19,19 @@ def H(q, p, m, par):
     return kinetic + q[0] * (par.heavy - m.cos(q[1]))
 
 
+@numba.njit
 def by_hand(t, y):
     """Return the derivative, as it is worked out on paper."""
     length, angle, p, spin = y
-    return [
+    return np.array([
         p / (1 + HEAVY), spin / length**2,
         spin**2 / length**3 - HEAVY + np.cos(angle), -length * np.sin(angle),
-    ]  # fmt: skip
+    ])  # fmt: skip
 
 
-def by_scipy() -> np.ndarray:
+def by_scipy(tol: float) -> np.ndarray:
     """Return the states at `TIMES` by SciPy."""
-    made = solve_ivp(by_hand, (0.0, END), START, "DOP853", TIMES, rtol=1e-12, atol=1e-12)
-    return made.y.T
+    return solve_ivp(by_hand, (0.0, END), START, "DOP853", TIMES, rtol=tol, atol=tol).y.T
 
 
 def compare() -> Comparison:
@@ -39,7 +40,7 @@ def compare() -> Comparison:
     problem = problems.Problem(machine, q0=START[:2], p0=START[2:], t_end=END)
     exact = integrators.integrate(problem, integrators.Gauss(s=8, h=0.01), TIMES).y
 
-    def run(method) -> np.ndarray:
+    def run(method) -> integrators.Solution:
         return integrators.integrate(problem, method, TIMES)
 
     def error(y) -> float:
@@ -49,9 +50,11 @@ def compare() -> Comparison:
         return problem.errors(y)["energy"].max()
 
     made = Comparison("Your own system: a swinging Atwood machine", "state at 501 times", 1e-8)
-    made.add("HBVM()", lambda: run(integrators.HBVM()), lambda s: error(s.y), lambda s: energy(s.y))
-    made.add("SciPy's DOP853", by_scipy, error, energy, calls=0)
-    made.add("heyoka", lambda: run(integrators.Taylor()), lambda s: error(s.y), lambda s: energy(s.y))
+    hbvm = [integrators.HBVM(), *(integrators.HBVM(tol=tol) for tol in (1e-12, 1e-10, 1e-8))]
+    taylor = [integrators.Taylor(tol=tol, fast_math=True) for tol in (1e-15, 1e-13, 1e-11, 1e-10)]
+    for library, methods in (("HBVM", hbvm), ("heyoka", taylor)):
+        made.add(library, settings(run, *methods), lambda s: error(s.y), lambda s: energy(s.y))
+    made.add("SciPy's DOP853", tolerances(by_scipy, 1e-13, 1e-12, 1e-11, 1e-10), error, energy)
     return made
 
 

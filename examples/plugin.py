@@ -1,8 +1,10 @@
 """A program that calls SciPy's solve_ivp, with HBVM as its method: only the argument `method` changes."""
 
+from functools import partial
+
 import numpy as np
 from scipy.integrate import solve_ivp
-from side_by_side import Comparison
+from side_by_side import Comparison, tolerances
 
 import problems
 from integrators.plugins.scipy import HBVM, field
@@ -28,8 +30,8 @@ def compare() -> Comparison:
     def energy(y: np.ndarray) -> float:
         return pendulum.errors(y)["energy"].max()
 
-    made.add("HBVM", lambda: run(HBVM, 1e-10), error, energy)
-    made.add("SciPy's DOP853", lambda: run("DOP853", 1e-13), error, energy, calls=0)
+    made.add("HBVM", tolerances(partial(run, HBVM), 1e-12, 1e-11, 1e-10, 1e-9), error, energy)
+    made.add("SciPy's DOP853", tolerances(partial(run, "DOP853"), 1e-13, 1e-12, 1e-11, 1e-10), error, energy)
     return made
 
 

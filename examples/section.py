@@ -9,7 +9,7 @@ from importlib.util import find_spec
 
 import heyoka as hy
 import numpy as np
-from side_by_side import Comparison
+from side_by_side import Comparison, settings, tolerances
 
 import integrators
 import problems
@@ -26,7 +26,7 @@ def starts() -> np.ndarray:
 
 
 @cache  # made once, as its users do
-def heyokas() -> tuple[hy.taylor_adaptive_dbl, list[np.ndarray]]:
+def heyokas(tol: float) -> tuple[hy.taylor_adaptive_dbl, list[np.ndarray]]:
     """Return heyoka's integrator, and the list in which its event puts the passages."""
     x, y, u, v = hy.make_vars("x", "y", "u", "v")
     found: list[np.ndarray] = []
@@ -37,12 +37,12 @@ def heyokas() -> tuple[hy.taylor_adaptive_dbl, list[np.ndarray]]:
 
     surface = hy.nt_event(x, passed, direction=hy.event_direction.positive)
     equations = [(x, u), (y, v), (u, -x - 2 * x * y), (v, -y - x**2 + y**2)]
-    return hy.taylor_adaptive(equations, np.zeros(4), nt_events=[surface]), found
+    return hy.taylor_adaptive(equations, np.zeros(4), tol=tol, nt_events=[surface]), found
 
 
-def by_heyoka() -> list[np.ndarray]:
+def by_heyoka(tol: float) -> list[np.ndarray]:
     """Return the passages of each orbit by heyoka."""
-    ta, found = heyokas()
+    ta, found = heyokas(tol)
     made = []
     for start in starts():
         found.clear()
@@ -53,18 +53,18 @@ def by_heyoka() -> list[np.ndarray]:
 
 
 @cache
-def pynamicalsyss():
+def pynamicalsyss(h: float):
     """Return the system of pynamicalsys, one of its own models; Yoshida's composition is its default."""
     from pynamicalsys import HamiltonianSystem
 
     system = HamiltonianSystem(model="henon heiles")
-    system.integrator("svy4", time_step=0.01)
+    system.integrator("svy4", time_step=h)
     return system
 
 
-def by_pynamicalsys(counts: list[int]) -> list[np.ndarray]:
+def by_pynamicalsys(counts: list[int], h: float) -> list[np.ndarray]:
     """Return so many passages of each orbit by pynamicalsys, which interpolates linearly between steps."""
-    system = pynamicalsyss()
+    system = pynamicalsyss(h)
     return [
         system.poincare_section(start[:2], start[2:], count + 1)[1:, 1:]  # the first one is the start
         for start, count in zip(starts(), counts, strict=True)
@@ -92,11 +92,13 @@ def compare() -> Comparison:
     made = Comparison(
         f"A section: {sum(map(len, exact))} passages of 12 orbits", "states at the passages", 1e-6
     )
-    made.add("HBVM()", lambda: ours(integrators.HBVM()), error, energy)
-    made.add("heyoka", by_heyoka, error, energy)
+    methods = [integrators.HBVM(tol=tol) for tol in (3e-16, 1e-13, 1e-11, 1e-9)]
+    made.add("HBVM", settings(ours, *methods), error, energy)
+    made.add("heyoka", tolerances(by_heyoka, 1e-15, 1e-13, 1e-11, 1e-9), error, energy)
     if find_spec("pynamicalsys"):
         counts = [len(true) for true in exact]
-        made.add("pynamicalsys's Yoshida 4", lambda: by_pynamicalsys(counts), error, energy)
+        steps = tolerances(lambda h: by_pynamicalsys(counts, h), 0.1, 0.03, 0.01, 0.003, name="h")
+        made.add("pynamicalsys's Yoshida 4", steps, error, energy)
     return made
 
 

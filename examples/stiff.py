@@ -5,8 +5,7 @@ Problem Solvers, release 2.4.
 """
 
 import numpy as np
-from scipy.integrate import solve_ivp
-from side_by_side import Comparison
+from side_by_side import Comparison, settings
 
 import integrators
 import problems
@@ -34,28 +33,27 @@ def reactions(y):
     ]
 
 
-def by_scipy(method: str) -> np.ndarray:
-    """Return the end by one of SciPy's methods for stiff systems, which makes the Jacobian by differences."""
-    return solve_ivp(
-        lambda t, y: reactions(y), (0.0, END), START, method, [END], rtol=1e-10, atol=1e-13
-    ).y[:, -1]  # fmt: skip
-
-
 def compare() -> Comparison:
-    """Integrate it with ours and with SciPy's methods."""
+    """Integrate it with ours and with methods for stiff systems, whose Jacobian is compiled too."""
     problem = problems.Problem(problems.VectorField(reactions, dim=8), y0=START, t_end=END)
     made = Comparison("A stiff system: HIRES", "end, relative to each concentration", 1e-8)
 
-    def error(y) -> float:
-        return np.abs(y / EXACT - 1.0).max()
+    def run(method) -> integrators.Solution:
+        return integrators.integrate(problem, method, [END])
 
-    for name, method in (("HBVM()", integrators.HBVM()), ("HBVM(tol=1e-10)", integrators.HBVM(tol=1e-10))):
+    made.add(
+        "HBVM", settings(run, *(integrators.HBVM(tol=tol) for tol in (1e-12, 1e-10, 1e-9, 1e-8))),
+        lambda solution: np.abs(solution.y[-1] / EXACT - 1.0).max(),
+    )  # fmt: skip
+    for library, method in (
+        ("SciPy's Radau", integrators.Radau), ("SciPy's LSODA", integrators.LSODA),
+        ("SUNDIALS' CVODE", integrators.CVODE),
+    ):  # fmt: skip
+        methods = [method(rtol=tol, atol=1e-3 * tol) for tol in (1e-11, 1e-10, 1e-9, 1e-8)]
         made.add(
-            name, lambda method=method: integrators.integrate(problem, method, [END]),
-            lambda solution: error(solution.y[-1]),
+            library, settings(run, *methods),
+            lambda solution: np.abs(solution.y[-1] / EXACT - 1.0).max(),
         )  # fmt: skip
-    made.add("SciPy's Radau", lambda: by_scipy("Radau"), error, calls=0)
-    made.add("SciPy's LSODA", lambda: by_scipy("LSODA"), error, calls=0)
     return made
 
 
