@@ -48,7 +48,10 @@ def _inline(self: Any, node: nodes.math) -> None:
 
 
 def _block(self: Any, node: nodes.math_block) -> None:
-    self.body.append(f'<div class="math" tabindex="0">{_drawn(node.astext(), inline=False)}</div>')
+    latex = node.astext()
+    if "\\\\" in latex:  # several lines
+        latex = rf"\begin{{aligned}}{latex}\end{{aligned}}"
+    self.body.append(f'<div class="math" tabindex="0">{_drawn(latex, inline=False)}</div>')
     raise nodes.SkipNode
 
 

@@ -36,10 +36,12 @@ def gradient(
 ) -> tuple[float, dict[str, Array]]:
     r"""Return a function of a trajectory's end, or a sum over samples, and its derivatives by the adjoint.
 
-    With the steps ``y_{n+1} = y_n + h sum_j b_j f(Y_j)`` that were taken, from the last one back,
+    With the steps :math:`y_{n+1} = y_n + h \sum_j b_j f(Y_j)` that were taken, from the last one back,
 
-        V_i = f_y(Y_i)' L_i,    L_i = l_{n+1} + h sum_j (b_j a_ji / b_i) V_j,
-        l_n = l_{n+1} + h sum_j b_j V_j,    g_n = g_{n+1} + h sum_i b_i f_par(Y_i)' L_i,
+    .. math::
+
+        V_i &= f_y(Y_i)^T L_i, \qquad L_i = l_{n+1} + h \sum_j \frac{b_j a_{ji}}{b_i} V_j, \\
+        l_n &= l_{n+1} + h \sum_j b_j V_j, \qquad g_n = g_{n+1} + h \sum_i b_i f_{par}(Y_i)^T L_i,
 
     where l begins as the gradient of the function at the end, and grows by that of each sample; l_0 and g_0
     are the derivatives with respect to the start and to the parameters. This is the chain rule: they are the

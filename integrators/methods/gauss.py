@@ -29,7 +29,7 @@ Precision = Literal["double", "double-double"]
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Gauss(MethodBase):
-    """Gauss(s): the collocation method of order 2s at the s Gauss nodes.
+    r"""Gauss(s): the collocation method of order 2s at the s Gauss nodes.
 
     Bitwise identical to ``HBVM(k=s, s=s, h)``: with k = s the polynomial's derivative equals f at the nodes
     (equations: see `HBVM`). On Poisson systems, for which HBVM has separate code, identical up to rounding.
@@ -60,18 +60,22 @@ class Gauss(MethodBase):
         With ``tol`` and ``s`` only: adaptive steps that preserve the long-time behaviour, because the
         reversed integration takes the same steps. Their density rho follows a rate w of the field,
 
-            w^4 = norm((f_y^2)_qq)^2 + w_0^4,    f_y the Jacobian of the field f,
-            log rho_{n+1/2} = log rho_{n-1/2} + 2 epsilon (w'/w)(y_n) / (rho_{n-1/2} + rho_{n+1/2}),
-            h_{n+1/2} = epsilon / rho_{n+1/2},    log rho_{1/2} = log w(y_0) + (epsilon/2) (w'/w^2)(y_0),
+        .. math::
 
-        (E. Hairer, G. Söderlind, SIAM J. Sci. Comput. 26 (2005) 1838-1851). (f_y^2)_qq is the derivative of
-        the accelerations; w_0^2 is its median norm over the time of 256 ordinary adaptive steps, and epsilon
-        the median of h w over these, at most 0.2. So ``tol`` is the local error of a typical step, and no
-        step is rejected. In reversible systems the energy does not drift and the time-reversal error is at
-        round-off (`test_reversible`), as long as the motion is regular: chaos amplifies rounding errors, and
-        ``tol`` does not control a close encounter whose time scale differs from that of the first steps. For
-        systems of positions and momenta given by a formula without the time; its sums are unrolled, so for a
-        few bodies. Fixed-point iteration.
+            w^4 &= \| (f_y^2)_{qq} \|^2 + w_0^4, \\
+            \log \rho_{n+1/2} &= \log \rho_{n-1/2}
+                + \frac{2 \epsilon}{\rho_{n-1/2} + \rho_{n+1/2}} \frac{w'}{w}(y_n), \\
+            h_{n+1/2} &= \epsilon / \rho_{n+1/2}, \\
+            \log \rho_{1/2} &= \log w(y_0) + \frac{\epsilon}{2} \frac{w'}{w^2}(y_0)
+
+        (E. Hairer, G. Söderlind, SIAM J. Sci. Comput. 26 (2005) 1838-1851). With the Jacobian f_y of the
+        field, (f_y^2)_qq is the derivative of the accelerations; w_0^2 is its median norm over the time of
+        256 ordinary adaptive steps, and epsilon the median of h w over these, at most 0.2. So ``tol`` is the
+        local error of a typical step, and no step is rejected. In reversible systems the energy does not
+        drift and the time-reversal error is at round-off (`test_reversible`), as long as the motion is
+        regular: chaos amplifies rounding errors, and ``tol`` does not control a close encounter whose time
+        scale differs from that of the first steps. For systems of positions and momenta given by a formula
+        without the time; its sums are unrolled, so for a few bodies. Fixed-point iteration.
     precision : {"double", "double-double"}
         ``"double-double"``: every number of a step is an unevaluated sum of two doubles, with 32 digits; only
         with ``s`` and ``h``. About a hundred times slower, and 3 to 7 times slower than heyoka's

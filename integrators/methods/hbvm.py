@@ -34,11 +34,13 @@ class HBVM(MethodBase):
     With the orthonormal shifted Legendre polynomials ``P_j`` and the k-point
     Gauss rule ``(c_l, b_l)`` on [0, 1], one step of length h from ``y_0`` is
 
-        gamma_j = sum_l b_l P_j(c_l) f(t_0 + c_l h, Y_l),             j = 0 .. s-1,
-        Y_l     = y_0 + h sum_j gamma_j int_0^{c_l} P_j,              l = 1 .. k,
-        y_1     = y_0 + h gamma_0.
+    .. math::
 
-    As a Runge-Kutta method: ``A = I P' Omega`` (rank s), weights b, nodes c.
+        \gamma_j &= \sum_{l=1}^k b_l P_j(c_l) f(t_0 + c_l h, Y_l), \quad j = 0, \dots, s-1, \\
+        Y_l &= y_0 + h \sum_{j=0}^{s-1} \gamma_j \int_0^{c_l} P_j(x)\,dx, \quad l = 1, \dots, k, \\
+        y_1 &= y_0 + h \gamma_0.
+
+    As a Runge-Kutta method: :math:`A = I P^T \Omega` (rank s), weights b, nodes c.
 
     Properties, each asserted in ``tests/integrators``:
 
@@ -75,9 +77,11 @@ class HBVM(MethodBase):
     field that has them (`test_adaptive_steps`, `test_weak_discontinuities`).
 
     These equations do not conserve the energy of a Poisson system y' = B(y) grad H(y)
-    whose structure B varies. There, with ``G_i = sum_l b_l P_i(c_l) grad H(Y_l)``,
+    whose structure B varies. There, with :math:`G_i = \sum_l b_l P_i(c_l) \nabla H(Y_l)`,
 
-        gamma_j = sum_l b_l P_j(c_l) B(Y_l) sum_i P_i(c_l) G_i
+    .. math::
+
+        \gamma_j = \sum_{l=1}^k b_l P_j(c_l) B(Y_l) \sum_{i=0}^{s-1} P_i(c_l) G_i
 
     replaces the first equation. It is identical for constant B and for k = s, has the same order, and
     conserves the energy because B is skew-symmetric; it does not conserve the Casimirs of B
@@ -137,7 +141,9 @@ class HBVM(MethodBase):
         end of each step is then projected onto the initial energy H_0. With the gradient g of the energy H
         and the sizes s_i of the blocks,
 
-            y_i <- y_i - s_i^2 g_i (H(y) - H_0) / sum_j (s_j g_j)^2,
+        .. math::
+
+            y_i \leftarrow y_i - \frac{s_i^2 g_i}{\sum_j (s_j g_j)^2} (H(y) - H_0),
 
         repeated until the residual is at round-off. For loose tolerances: a run takes about half the time,
         since conservation without the projection requires stage equations and a quadrature that are accurate

@@ -47,10 +47,13 @@ class LineIntegral(MethodBase):
     coefficients ``gamma_j`` of the field f and ``phi_ij`` of the gradients of the
     invariants at the k stages, and a fixed diagonal metric W, one step is
 
-        sigma' = sum_{j<s} P_j (gamma_j - W sum_i phi_ij alpha_i),    y_1 = sigma(t_0 + h),
-        sum_m (sum_j phi_ij' W phi_mj) alpha_m = sum_j phi_ij' gamma_j.
+    .. math::
 
-    Each invariant L_i changes by ``h sum_j phi_ij' sigma'_j``, which the second line
+        \sigma' &= \sum_{j=0}^{s-1} P_j \Big( \gamma_j - W \sum_i \phi_{ij} \alpha_i \Big), \\
+        y_1 &= \sigma(t_0 + h), \\
+        \sum_j \phi_{ij}^T \gamma_j &= \sum_m \Big( \sum_j \phi_{ij}^T W \phi_{mj} \Big) \alpha_m.
+
+    Each invariant L_i changes by :math:`h \sum_j \phi_{ij}^T \sigma'_j`, which the last line
     makes 0 up to the error of the quadrature. As ``alpha = O(h^{2s})``, the order
     of HBVM(k, s) is preserved.
 

@@ -25,20 +25,26 @@ Row = dict[int, Node]
 
 
 class Constrained(System):
-    """A mechanical system with holonomic constraints g(q) = 0.
+    r"""A mechanical system with holonomic constraints g(q) = 0.
 
     With the energy H(q, p), u = dH/dp and the Jacobian G = dg/dq,
 
-        q' = u,    p' = -dH/dq + f - G' lambda,    g(q) = 0.
+    .. math::
+
+        q' = u, \qquad p' = -\frac{\partial H}{\partial q} + f - G^T \lambda, \qquad g(q) = 0.
 
     The multipliers follow from g'' = 0: with the velocity of the constraints w(q, p) = G u,
 
-        (dw/dp G') lambda = dw/dq u + dw/dp (f - dH/dq),
+    .. math::
 
-    whose symmetric matrix G (d^2H/dp^2) G' is factored symbolically, without the zeros between constraints
-    that share no coordinate: a chain costs O(n). With these multipliers q' and p' are an ordinary system (of
-    index 0). On the manifold g = 0, w = 0 its invariants are the energy, ``"constraints"`` (all g) and
-    ``"constraint_rates"`` (all w). `integrators.HBVM` conserves them at round-off.
+        \frac{\partial w}{\partial p} G^T \lambda = \frac{\partial w}{\partial q} u
+            + \frac{\partial w}{\partial p} \Big( f - \frac{\partial H}{\partial q} \Big),
+
+    whose symmetric matrix :math:`G (\partial^2 H / \partial p^2) G^T` is factored symbolically, without the
+    zeros between constraints that share no coordinate: a chain costs O(n). With these multipliers q' and p'
+    are an ordinary system (of index 0). On the manifold g = 0, w = 0 its invariants are the energy,
+    ``"constraints"`` (all g) and ``"constraint_rates"`` (all w). `integrators.HBVM` conserves them at
+    round-off.
 
     Parameters
     ----------
