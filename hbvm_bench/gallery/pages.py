@@ -96,12 +96,20 @@ def _page(name: str, problem: Problem) -> str:
         f"{summary[:1].upper()}{summary[1:]}\n",
         f"$$H = {latex(problem.system)}$$\n",
         f"`{problem!r}`, t from {problem.t0:g} to {problem.t_end:g}.\n",
-        *(f"- `{head}`: {body}" for head, body in arguments),
+        *(f"- `{head}`{_defaults(name, head)}: {body}" for head, body in arguments),
         *(f"- returns: {body}" for _, body in returns[:1]),
         *([f"- exactly 0 by symmetry: {guards}"] if guards else []),
         *(f"- source: {source}" for source in problem.references),
     ]
     return "\n".join(lines) + "\n"
+
+
+def _defaults(name: str, head: str) -> str:
+    """Return the defaults of the parameters that ``head`` names, such as ``"q1, q2 : float"``."""
+    signature = inspect.signature(registry.factory(name)).parameters
+    values = [signature[one.strip()].default for one in head.partition(":")[0].split(",")]
+    shown = [f"{value:.7g}" if isinstance(value, float) else repr(value) for value in values]
+    return f", default {', '.join(shown)}" if values != [None] else ""
 
 
 def _numpydoc(doc: str) -> dict[str, str]:
