@@ -58,6 +58,11 @@ nb_execution_cache_path = str(HERE / "_build" / "executed")
 nb_execution_timeout = 300
 nb_execution_raise_on_error = True
 nb_merge_streams = True
+os.environ["MATPLOTLIBRC"] = str(HERE / "tutorials" / "pictures.mplstyle")
+_profile = HERE / "_build" / "ipython" / "profile_default" / "ipython_kernel_config.py"
+_profile.parent.mkdir(parents=True, exist_ok=True)
+_profile.write_text('get_config().InlineBackend.figure_formats = {"svg"}\n', encoding="utf-8")
+os.environ["IPYTHONDIR"] = str(_profile.parents[1])
 
 # --- reference, from the docstrings ---
 autosummary_generate = True

@@ -11,8 +11,9 @@ DOCS = ROOT / "docs"
 MADE = {"_build", "made", "api"}  # folders that a build of the site writes
 
 FENCE = re.compile(r"^(`{3,}|~{3,})(.*?)^\1[ \t]*$", re.MULTILINE | re.DOTALL)
+SHOWN = r"(?::(?!tags: \[remove-cell\])[^\n]*\n)"  # an option of a cell that readers see
 CELL = re.compile(
-    r"^```\{code-cell\}[^\n]*\n(?:---\n.*?\n---\n|(?::[^\n]*\n)+\n?)?(.*?)^```[ \t]*$",
+    rf"^```\{{code-cell\}}[^\n]*\n(?:---\n.*?\n---\n|{SHOWN}+\n?)?(?!:)(.*?)^```[ \t]*$",
     re.MULTILINE | re.DOTALL,
 )
 TOCTREE = re.compile(r"^```\{toctree\}\n(.*?)^```", re.MULTILINE | re.DOTALL)
@@ -71,7 +72,7 @@ def anchors(path: Path) -> set[str]:
 
 
 def cells(path: Path) -> list[str]:
-    """Return the code of a page's cells, in order."""
+    """Return the code of the cells of a page that readers see, in order."""
     return CELL.findall(path.read_text(encoding="utf-8"))
 
 

@@ -1,9 +1,10 @@
 """Links of the documentation lead somewhere, and what its pages show runs."""
 
 import doctest
-import os
 import re
+import sys
 import tempfile
+from pathlib import Path
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
@@ -83,8 +84,8 @@ def test_the_cells_of_a_page_run(page, monkeypatch, tmp_path):
     monkeypatch.setattr(plt, "show", lambda: plt.close("all"))
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     monkeypatch.setenv("PYTHONPATH", str(pages.ROOT), prepend=":")
-    monkeypatch.setenv("PATH", os.environ["PATH"])  # which a page changes: it is given back
-    monkeypatch.chdir(page.parent)  # where a notebook runs
+    monkeypatch.setenv("PATH", str(Path(sys.executable).parent), prepend=":")  # its commands
+    monkeypatch.chdir(tmp_path)
     with mpl.rc_context():
         plt.switch_backend("Agg")
         try:

@@ -5,14 +5,18 @@ import os
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 from tests.docs import pages
 
 BLOCK = re.compile(r"^```python\n(.*?)^```[ \t]*$|" + pages.CELL.pattern, re.MULTILINE | re.DOTALL)
-PASTED = [page for page in pages.sources() if BLOCK.search(page.read_text(encoding="utf-8"))]
-QUICK = ("README.md", "general.md", "solutions.md")
+QUOTED = "kernel.md"  # its blocks are parts of the package's code
+PASTED = [
+    page for page in pages.sources() if page.name != QUOTED and BLOCK.search(page.read_text(encoding="utf-8"))
+]
+QUICK = ("README.md", "solutions.md")  # the cells of others run in test_pages.py
 PEERS = ("heyoka", "rebound", "diffrax", "jax", "torch")
 
 
@@ -20,10 +24,10 @@ def pasted(page):
     """Return what is typed, without the prompts and what is printed."""
     typed = []
     for python, cell in BLOCK.findall(page.read_text(encoding="utf-8")):
-        block = python or cell
+        block = python or pages.plain(cell)
         prompted = doctest.DocTestParser().get_examples(block)
         typed.append("".join(example.source for example in prompted) if prompted else block)
-    return "\n".join(typed)
+    return "\n".join(["from tests.docs.pages import shell as _shell, write as _write", *typed])
 
 
 @pytest.mark.parametrize(
@@ -34,7 +38,8 @@ def pasted(page):
 def test_a_page_runs_pasted_from_top_to_bottom(page, tmp_path):
     script = tmp_path / "page.py"
     script.write_text(pasted(page), encoding="utf-8")
-    environment = {**os.environ, "PYTHONPATH": str(pages.ROOT), "MPLBACKEND": "Agg"}
+    commands = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    environment = {**os.environ, "PYTHONPATH": str(pages.ROOT), "MPLBACKEND": "Agg", "PATH": commands}
     made = subprocess.run(
         [sys.executable, script], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
     )
