@@ -97,7 +97,8 @@ def from_sympy(
             raise InputError(
                 f"the equations of this {type(expression).__name__} have {matrix.rows} unknowns for "
                 f"{len(state)} coordinates and velocities: the last {matrix.rows - len(state)} are Lagrange "
-                "multipliers of its constraints; choose coordinates that are independent."
+                "multipliers of its constraints; make a problems.Constrained of the coordinates, or choose "
+                "coordinates that are independent."
             )
         places: dict[Any, Callable[..., Any]] = {x: _component("y", i) for i, x in enumerate(state)}
         rows = [

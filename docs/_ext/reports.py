@@ -1,15 +1,18 @@
-"""Links to the reports of the repository: to their pages, which are put beside the site."""
+"""The reports as pages of the site: their texts, and beside it their own pages with all rows."""
 
 import os
 import re
 import shutil
 from pathlib import Path
 
-from docutils import nodes
 from sphinx import addnodes
 from sphinx.application import Sphinx
 from sphinx.transforms.post_transforms import SphinxPostTransform
-from sphinx.util.osutil import relative_uri
+
+REPORTS = Path(__file__).parents[2] / "reports"
+FIGURE = re.compile(r"\]\((figures/[^)]+)\)")
+TABLES = "rows"
+"""The folder of the built site with the reports' own pages, which `hbvm-bench report` draws."""
 
 BRAND = '<span class="brand">hbvm-bench</span>'
 WAYS = """<a class="brand" href="../../index.html">hbvm-bench</a>
@@ -18,47 +21,60 @@ WAYS = """<a class="brand" href="../../index.html">hbvm-bench</a>
 <a href="../../howto/reading_a_report.html">How to read a report</a>
 </nav>"""
 OUT = re.compile(r'<nav class="ways" aria-label="All reports">.*?</nav>', re.DOTALL)  # of local pages
-LINK = re.compile(r'href="([\w./-]+)"')
+FILES = ("*.svg", "*.xz")
+
+
+def texts() -> dict[str, Path]:
+    """Return the text of each report by the name of its folder."""
+    return {path.parent.name: path for path in sorted(REPORTS.glob("*/*.md"))}
+
+
+def _write(app: Sphinx) -> None:
+    """Write a page of the site for each report."""
+    folder = Path(app.srcdir) / "reports"
+    folder.mkdir(exist_ok=True)
+    for name, path in texts().items():
+        title, _, rest = path.read_text(encoding="utf-8").partition("\n")
+        if (path.parent / "index.html").is_file():
+            page = f"../{TABLES}/{name}/index.html"
+            title += f'\n\n<a href="{page}">Sortable tables, all figures and all rows of this report</a>'
+        text = FIGURE.sub(rf"](../../reports/{name}/\1)", f"{title}\n{rest}")
+        text = text.replace("](results.sqlite.xz)", f"](../../reports/{name}/results.sqlite.xz)")
+        page = folder / f"{name}.md"
+        if not page.is_file() or page.read_text(encoding="utf-8") != text:  # else Sphinx reads it again
+            page.write_text(text, encoding="utf-8")
 
 
 class Reports(SphinxPostTransform):
     """Turn a link to a report's text into one to its page, before MyST looks for a page of the site."""
 
     default_priority = 5
-    formats = ("html",)
 
     def run(self, **_: object) -> None:
-        for node in list(self.document.findall(addnodes.pending_xref)):
-            if node.get("refdomain") != "doc":
-                continue
-            page = Path(os.path.normpath(Path(self.env.srcdir, node["reftarget"]))).parent / "index.html"
-            top = Path(self.env.srcdir).parent
-            if top / "reports" not in page.parents or not page.is_file():
-                continue
-            address = page.relative_to(top)
-            here = self.app.builder.get_target_uri(self.env.docname)
-            link = nodes.reference("", "", *node.children, refuri=relative_uri(here, address.as_posix()))
-            node.replace_self(link)
-            _copy(page, (Path(self.app.outdir) / address).parent, set())
+        for node in self.document.findall(addnodes.pending_xref):
+            if node.get("refdomain") == "doc":
+                text = Path(os.path.normpath(Path(self.env.srcdir, f"{node['reftarget']}.md")))
+                if text in texts().values():
+                    node["reftarget"] = f"reports/{text.parent.name}"
 
 
-def _copy(page: Path, folder: Path, done: set[Path]) -> None:
-    """Put a report's page, with links to the site, into a folder, and the files beside it that it uses."""
-    done.add(page)
-    folder.mkdir(parents=True, exist_ok=True)
-    text = OUT.sub("", page.read_text(encoding="utf-8"), count=1)
-    (folder / page.name).write_text(text.replace(BRAND, WAYS, 1), encoding="utf-8")
-    for name in set(LINK.findall(text)):
-        source = (page.parent / name).resolve()
-        if source.parent != page.parent or not source.is_file() or source in done:
-            continue
-        if source.suffix == ".html":
-            _copy(source, folder, done)
-        else:
-            shutil.copyfile(source, folder / name)
+def _copy(app: Sphinx, error: Exception | None) -> None:
+    """Put the reports' own pages, with links to the site, into it, and the files beside them."""
+    if error or app.builder.format != "html":
+        return
+    for name, path in texts().items():
+        folder = Path(app.outdir) / TABLES / name
+        folder.mkdir(parents=True, exist_ok=True)
+        for page in path.parent.glob("*.html"):
+            text = OUT.sub("", page.read_text(encoding="utf-8"), count=1)
+            (folder / page.name).write_text(text.replace(BRAND, WAYS, 1), encoding="utf-8")
+        for file in (file for pattern in FILES for file in path.parent.glob(pattern)):
+            shutil.copyfile(file, folder / file.name)
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Register the transform."""
+    """Act before Sphinx looks for pages, at links, and after the build."""
+    app.connect("builder-inited", _write)
     app.add_post_transform(Reports)
+    app.connect("build-finished", _copy)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -8,7 +8,7 @@ from types import ModuleType
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
-MADE = {"_build", "made", "api"}  # folders that a build of the site writes
+MADE = {"_build", "made", "api", "reports"}  # folders that a build of the site writes
 
 FENCE = re.compile(r"^(`{3,}|~{3,})(.*?)^\1[ \t]*$", re.MULTILINE | re.DOTALL)
 SHOWN = r"(?::(?!tags: \[remove-cell\])[^\n]*\n)"  # an option of a cell that readers see
