@@ -46,6 +46,7 @@ def listed(path: Path) -> list[str]:
         line for block in TOCTREE.findall(text) for line in block.split("\n") if not line.startswith(":")
     ]
     named = [line.strip() for line in [*lines, *CARD.findall(text), *DOC.findall(text)] if line.strip()]
+    named = [name for name in named if not name.endswith("*")]  # pages that a build of the site writes
     return [TITLED.sub(r"\1", name) for name in named]
 
 
