@@ -1,5 +1,6 @@
 """Pages that are generated from the package at every build: commands, metrics, gallery and others."""
 
+import ast
 import re
 from pathlib import Path
 
@@ -10,6 +11,21 @@ from sphinx.application import Sphinx
 from hbvm_bench.campaign.file import load, shipped
 from hbvm_bench.commands import app, listing
 from hbvm_bench.measure.metrics import METRICS
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+FIELDS = {
+    "Celestial mechanics": (
+        "bodies", "long_run", "long_runs", "encounters", "star_cluster", "radial_velocities", "geodesics",
+    ),
+    "Molecules": ("molecular_dynamics", "molecular_dynamics_sizes"),
+    "Lattices and partial differential equations": ("lattice", "networks"),
+    "Mechanics": (
+        "own_system", "linkages", "mass_matrix", "impacts", "bouncing_ball", "measured_forcing", "fit",
+    ),
+    "Chaos": ("section", "exponents", "chaos_map", "ensemble", "short"),
+    "Stiff chemistry": ("stiff",),
+    "Programs": ("plugin", "solution", "scaling", "campaign", "own_campaign"),
+}  # fmt: skip
 
 REPORT = re.compile(r"^## \[(.+)\]\((\S+)\)$")
 THUMBNAIL = re.compile(r'^<a href="[^"]*"><img src="([^"]*)".*$')
@@ -45,6 +61,20 @@ def citations() -> str:
     return "\n\n".join(["```bibtex", *listing.citations(()), "```", ""])
 
 
+def examples() -> str:
+    """Return the scripts in `examples`, by field, with what each says of itself."""
+    made = []
+    for field, names in FIELDS.items():
+        made.append(f"## {field}\n")
+        for name in names:
+            text = ast.get_docstring(ast.parse((EXAMPLES / f"{name}.py").read_text(encoding="utf-8"))) or ""
+            made.append(
+                f"- [{name}.py](../../examples/{name}.py): {' '.join(text.partition(chr(10) * 2)[0].split())}"
+            )
+        made.append("")
+    return "\n".join(made)
+
+
 def reports() -> str:
     """Return the list of reports in `reports/README.md`, with links from a page of the site's root."""
     text = (Path(__file__).parents[2] / "reports" / "README.md").read_text(encoding="utf-8")
@@ -76,7 +106,7 @@ def gallery() -> str:
 def _write(app: Sphinx) -> None:
     made = Path(app.srcdir) / "reference" / "made"
     made.mkdir(parents=True, exist_ok=True)
-    for make in (commands, metrics, campaigns, citations, reports, gallery):
+    for make in (commands, metrics, campaigns, citations, examples, reports, gallery):
         path, text = made / f"{make.__name__}.md", make()
         if not path.is_file() or path.read_text(encoding="utf-8") != text:  # else Sphinx reads it again
             path.write_text(text, encoding="utf-8")

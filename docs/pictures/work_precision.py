@@ -53,7 +53,7 @@ def draw(path: Path) -> None:
     """Write the picture."""
     style = {"svg.hashsalt": "work_precision", "svg.fonttype": "none", "font.size": 10}
     with mpl.rc_context(style):
-        figure, ax = plt.subplots(figsize=(7.0, 4.0), layout="constrained")
+        figure, ax = plt.subplots(figsize=(5.4, 3.8), layout="constrained")
         for name, points in settings().items():
             line = front(points)
             ax.loglog(*zip(*line, strict=True), "o-", color=LINES[name], markersize=3.5, linewidth=1.4)

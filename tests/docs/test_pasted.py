@@ -1,6 +1,8 @@
 """Every page can be pasted from top to bottom into a fresh process."""
 
-import doctest
+import code
+import contextlib
+import io
 import os
 import re
 import subprocess
@@ -13,6 +15,7 @@ from tests.docs import pages
 
 BLOCK = re.compile(r"^```python\n(.*?)^```[ \t]*$|" + pages.CELL.pattern, re.MULTILINE | re.DOTALL)
 QUOTED = "kernel.md"  # its blocks are parts of the package's code
+PROMPTED = re.compile(r"^(?:>>> |\.\.\. ?)(.*)$", re.MULTILINE)  # what the site's button copies
 PASTED = [
     page for page in pages.sources() if page.name != QUOTED and BLOCK.search(page.read_text(encoding="utf-8"))
 ]
@@ -25,9 +28,19 @@ def pasted(page):
     typed = []
     for python, cell in BLOCK.findall(page.read_text(encoding="utf-8")):
         block = python or pages.plain(cell)
-        prompted = doctest.DocTestParser().get_examples(block)
-        typed.append("".join(example.source for example in prompted) if prompted else block)
+        typed.append("\n".join(PROMPTED.findall(block)) or block)
     return "\n".join(["from tests.docs.pages import shell as _shell, write as _write", *typed])
+
+
+@pytest.mark.parametrize(
+    "page", [pages.ROOT / "README.md", pages.DOCS / "index.md"], ids=lambda page: page.name
+)
+def test_the_first_examples_can_be_pasted_into_a_prompt(page):
+    console = code.InteractiveConsole()
+    typed = pasted(page)
+    with contextlib.redirect_stderr(io.StringIO()) as errors, contextlib.redirect_stdout(io.StringIO()):
+        waits = [console.push(line) for line in [*typed.splitlines(), ""]]
+    assert (errors.getvalue(), waits[-1]) == ("", False)
 
 
 @pytest.mark.parametrize(

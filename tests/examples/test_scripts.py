@@ -1,5 +1,6 @@
 """Each example script runs, and says what it says it shows."""
 
+import ast
 import json
 import os
 import subprocess
@@ -42,14 +43,20 @@ SAYS = {
 }
 
 
-def test_every_script_has_its_words():
-    names = {path.name for path in SCRIPTS.glob("*.py")} - {
-        "side_by_side.py",
-        "heyoka_bodies.py",
-        "run_all.py",
-        "molecular_dynamics_sizes.py",
-    }  # which others import, which runs others, and which takes minutes
-    assert names == set(SAYS)
+MINUTES = "molecular_dynamics_sizes.py"
+NO_EXAMPLES = {"side_by_side.py", "heyoka_bodies.py", "run_all.py"}  # others import them, or it runs others
+
+
+def test_every_script_has_its_words_and_a_field():
+    names = {path.name for path in SCRIPTS.glob("*.py")} - NO_EXAMPLES
+    assert names == {*SAYS, MINUTES}
+    made = ast.parse((SCRIPTS.parent / "docs" / "_ext" / "made.py").read_text(encoding="utf-8"))
+    fields = next(
+        ast.literal_eval(node.value)
+        for node in made.body
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "FIELDS"
+    )
+    assert sorted(f"{name}.py" for listed in fields.values() for name in listed) == sorted(names)
 
 
 def test_the_sizes_of_molecular_dynamics_are_measured(monkeypatch):
@@ -84,9 +91,10 @@ def test_the_page_of_tasks_says_when_with_what_kernel_and_beside_what_load(monke
     ) in run_all.page()
 
 
-# What takes longest: two references, XLA, many processes, seconds with each library.
+# What takes longest: two references, XLA, many processes, a search for settings of each library.
 SLOW = {"own_campaign.py", "campaign.py", "bodies.py", "fit.py", "radial_velocities.py", "long_runs.py"}
 SLOW |= {"scaling.py", "section.py", "lattice.py", "linkages.py", "star_cluster.py", "encounters.py"}
+SLOW |= {"molecular_dynamics.py", "exponents.py", "plugin.py", "stiff.py", "own_system.py"}
 
 
 @pytest.mark.parametrize(
