@@ -24,12 +24,12 @@ UNKNOWN_LOAD = ("campaign",)  # it does not wait for all that it starts: their w
 INTRODUCTION = """# Fourteen tasks, beside the library one would otherwise use
 
 Each is a short script in [examples](../examples/side_by_side.py), which the tests run. Of every method the
-same number of settings is tried, four where there is something to choose. The table has the fastest of those
-whose error is at most the requested one, or the most accurate where none is. Right-hand sides and Jacobians
-are compiled for every library; bodies in space are integrated with each library's own model of them. "First
-call" contains compilation, unless the machine has compiled the same before; "time" is the median of further ones.
-Where other work took more than a tenth of a core, no time is shown and nothing is judged.
-This page is written by `make examples`.
+same number of settings is tried, four where there is something to choose. The table has the fastest of
+those whose error is at most the requested one, or the most accurate where none is. Right-hand sides and
+Jacobians are compiled for every library; bodies in space are integrated with each library's own model of
+them. "First call" contains compilation, unless the machine has compiled the same before; "time" is the
+median of the others. Where other work took more than a tenth of a core, no time is shown and nothing is
+judged. This page is written by `make examples`.
 """
 
 

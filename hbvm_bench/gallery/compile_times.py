@@ -29,9 +29,9 @@ LANES = 8
 HEAD = """<!-- made by: hbvm-bench gallery docs --compile-times -->
 # From a Hamiltonian to machine code
 
-Large systems are declared with `m.sum(term, index)`: the term is traced once and stays a loop, so that the
-code grows with the term and not with the number of bodies. Processor seconds of one process on {processor}
-({python}), nothing cached, but numba and its first function loaded.
+In `m.sum(term, index)` the term is traced once and stays a loop: the code has the length of the term, however
+many bodies there are. CPU seconds of one process on {processor} ({python}) with empty caches and numba
+loaded.
 
 - trace: running the function on symbols, and differentiating it;
 - emit: writing the source, `lines` long;
