@@ -10,7 +10,8 @@ from sphinx.application import Sphinx
 from sphinx.transforms.post_transforms import SphinxPostTransform
 
 REPORTS = Path(__file__).parents[2] / "reports"
-FIGURE = re.compile(r"\]\((figures/[^)]+)\)")
+FIGURE = re.compile(r"^!\[(.*)\]\((figures/[^)]+)\)$", re.MULTILINE)
+WIDE = r"```{{figure}} ../../reports/{name}/\2\n:figclass: wide\n:alt: \1\n```"  # scrolls on a phone
 TABLES = "rows"
 """The folder of the built site with the reports' own pages, which `hbvm-bench report` draws."""
 
@@ -38,7 +39,7 @@ def _write(app: Sphinx) -> None:
         if (path.parent / "index.html").is_file():
             page = f"../{TABLES}/{name}/index.html"
             title += f'\n\n<a href="{page}">Sortable tables, all figures and all rows of this report</a>'
-        text = FIGURE.sub(rf"](../../reports/{name}/\1)", f"{title}\n{rest}")
+        text = FIGURE.sub(WIDE.format(name=name), f"{title}\n{rest}")
         text = text.replace("](results.sqlite.xz)", f"](../../reports/{name}/results.sqlite.xz)")
         page = folder / f"{name}.md"
         if not page.is_file() or page.read_text(encoding="utf-8") != text:  # else Sphinx reads it again
