@@ -39,7 +39,7 @@ def pytest_runtest_makereport(item, call):
 
 # Begun first, so that at the end no core waits for one of them: a file is the work of one process.
 LONG = (
-    *("test_report_browser.py", "test_diffrax.py", "test_runner.py", "test_pages.py", "test_conformance.py"),
+    *("test_report_browser.py", "test_diffrax.py", "test_runner.py", "test_pasted.py", "test_conformance.py"),
     *("test_pages_browser.py", "test_scripts.py", "test_peer_check.py", "test_general.py"),
 )
 

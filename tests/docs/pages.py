@@ -1,10 +1,8 @@
-"""The documentation as its sources are: its pages, where their links lead, what their cells run."""
+"""The documentation as its sources are: its pages, where their links lead, what their cells are."""
 
 import re
 import subprocess
-import sys
 from pathlib import Path
-from types import ModuleType
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -75,17 +73,6 @@ def anchors(path: Path) -> set[str]:
 def cells(path: Path) -> list[str]:
     """Return the code of the cells of a page that readers see, in order."""
     return CELL.findall(path.read_text(encoding="utf-8"))
-
-
-def run(path: Path) -> None:
-    """Run the cells of a page in order, in one name space, as a notebook does."""
-    module = sys.modules["page"] = ModuleType("page")  # where pickle finds what the page defines
-    vars(module).update(_shell=shell, _write=write)
-    try:
-        for number, cell in enumerate(cells(path), 1):
-            exec(compile(plain(cell), f"{path.name}, cell {number}", "exec"), vars(module))  # noqa: S102
-    finally:
-        del sys.modules["page"]
 
 
 def plain(cell: str) -> str:

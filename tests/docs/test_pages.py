@@ -1,22 +1,15 @@
-"""Links of the documentation lead somewhere, and what its pages show runs."""
+"""Links of the documentation lead somewhere, and its pictures are described; test_pasted.py runs its code."""
 
 import doctest
 import re
-import sys
-import tempfile
-from pathlib import Path
 
-import matplotlib as mpl
-import matplotlib.pyplot as plt
 import pytest
 
 from hbvm_bench.campaign.file import shipped
 from tests.docs import pages
 
 EXECUTED = [path for path in pages.sources() if pages.cells(path)]
-SLOW = ("own_campaign.md", "hosts.md")  # a study run whole; the plugins compile for long
 TUTORIALS = pages.listed(pages.DOCS / "tutorials" / "index.md")
-PEERS = ("heyoka", "rebound", "diffrax", "jax")
 
 
 def _name(path):
@@ -73,27 +66,3 @@ def test_every_picture_is_described_in_words(page):
     drawn = sum("plt.show()" in cell for cell in pages.cells(page))
     assert drawn >= 1
     assert page.read_text(encoding="utf-8").count("\n    alt: ") == drawn
-
-
-@pytest.mark.parametrize(
-    "page",
-    [pytest.param(page, marks=[pytest.mark.slow] if page.name in SLOW else []) for page in EXECUTED],
-    ids=map(_name, EXECUTED),
-)
-def test_the_cells_of_a_page_run(page, monkeypatch, tmp_path):
-    monkeypatch.setattr(plt, "show", lambda: plt.close("all"))
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    monkeypatch.setenv("PYTHONPATH", str(pages.ROOT), prepend=":")
-    monkeypatch.setenv("PATH", str(Path(sys.executable).parent), prepend=":")  # its commands
-    monkeypatch.chdir(tmp_path)
-    with mpl.rc_context():
-        plt.switch_backend("Agg")
-        try:
-            pages.run(page)
-        except ImportError as error:
-            library = next((name for name in PEERS if name in str(error)), None)
-            if library is None:
-                raise
-            pytest.skip(f"{_name(page)} DID NOT RUN: {library} is missing (pip install 'hbvm-bench[peers]')")
-        finally:
-            plt.close("all")

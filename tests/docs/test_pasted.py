@@ -19,7 +19,7 @@ PROMPTED = re.compile(r"^(?:>>> |\.\.\. ?)(.*)$", re.MULTILINE)  # what the site
 PASTED = [
     page for page in pages.sources() if page.name != QUOTED and BLOCK.search(page.read_text(encoding="utf-8"))
 ]
-QUICK = ("README.md", "solutions.md")  # the cells of others run in test_pages.py
+QUICK = ("README.md", "start.md", "solutions.md", "own_hamiltonian.md")
 PEERS = ("heyoka", "rebound", "diffrax", "jax", "torch")
 
 
@@ -54,7 +54,7 @@ def test_a_page_runs_pasted_from_top_to_bottom(page, tmp_path):
     commands = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
     environment = {**os.environ, "PYTHONPATH": str(pages.ROOT), "MPLBACKEND": "Agg", "PATH": commands}
     made = subprocess.run(
-        [sys.executable, script], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
+        [sys.executable, "-W", "error", script], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
     )
     missing = re.search(r"No module named '(\w+)'", made.stderr)
     if missing and missing[1] in PEERS:
