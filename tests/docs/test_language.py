@@ -4,6 +4,7 @@ import ast
 import io
 import re
 import tokenize
+from functools import cache
 
 import pytest
 
@@ -126,9 +127,17 @@ SOURCES = [
 DRAWN = sorted((pages.ROOT / "reports").rglob("*.md")) + sorted((pages.ROOT / "reports").rglob("*.svg"))
 
 
+@cache
+def any_of(phrases: tuple[str, ...]) -> re.Pattern[str]:
+    """Return a pattern of all phrases, which passes over a text once."""
+    return re.compile(rf"\b(?:{'|'.join(phrases)})")
+
+
 def retired(text: str, phrases: dict[str, str] = RETIRED | OUTSIDE_THE_KERNEL) -> dict[str, str]:
     """Return the retired phrases in a text, with the field's terms for them."""
-    joined = " ".join(re.sub(r"`[^`\n]*`", "", text).lower().split())
+    joined = " ".join(re.sub(r"`[^`\n]*`|<[^<>]*>", "", text).lower().split())
+    if not any_of(tuple(phrases)).search(joined):
+        return {}
     return {phrase: term for phrase, term in phrases.items() if re.search(rf"\b{phrase}", joined)}
 
 

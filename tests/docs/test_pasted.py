@@ -54,7 +54,12 @@ def test_a_page_runs_pasted_from_top_to_bottom(page, tmp_path):
     commands = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
     environment = {**os.environ, "PYTHONPATH": str(pages.ROOT), "MPLBACKEND": "Agg", "PATH": commands}
     made = subprocess.run(
-        [sys.executable, "-W", "error", script], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
+        [sys.executable, "-W", "error", script],
+        cwd=tmp_path,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
     )
     missing = re.search(r"No module named '(\w+)'", made.stderr)
     if missing and missing[1] in PEERS:

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from integrators import ensemble, solution
 from integrators.running import watch
+from integrators.solution import files
 
 PAGE = (Path(__file__).parents[2] / "docs" / "reference" / "public.md").read_text(encoding="utf-8")
 ROWS = re.findall(r"^\| `([\w.]+)` \| [^|]+ \| ([^|]+) \|$", PAGE, flags=re.MULTILINE)
@@ -28,5 +28,5 @@ def test_the_page_lists_every_module_with_public_names():
 
 def test_the_page_tells_the_formats_of_files():
     row = r"^\| (solution|ensemble|checkpoint) \| [^|]+ \| (\d+)"
-    written = {"solution": solution.FORMAT, "ensemble": ensemble.FORMAT, "checkpoint": watch.VERSION}
+    written = {"solution": files.FORMAT, "ensemble": files.FORMAT, "checkpoint": watch.VERSION}
     assert dict(re.findall(row, PAGE, flags=re.MULTILINE)) == {name: str(n) for name, n in written.items()}
