@@ -14,6 +14,7 @@ import problems
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE / "_ext"))
+from first_page import headline  # noqa: E402 -- beside the extensions
 from stored import Stored  # noqa: E402 -- beside the extensions
 
 os.environ["PYDEVD_DISABLE_FILE_VALIDATION"] = (
@@ -50,6 +51,7 @@ myst_substitutions = {  # for pages that enable them
     "version": version,
     "year": time.strftime("%Y"),
     "stored": Stored(),  # a value of a report's table
+    "headline": headline(),
     "claims": sum(int(count) for count, _ in _verdicts),
     **{words.replace(" ", "_"): count for count, words in _verdicts},
 }

@@ -9,7 +9,6 @@ import pytest
 from tests.docs import pages
 
 sys.path.insert(0, str(pages.DOCS / "_ext"))
-sys.path.insert(0, str(pages.DOCS))
 sys.path.insert(0, str(pages.DOCS / "pictures"))
 import first_page
 import work_precision
@@ -41,7 +40,7 @@ def quotes() -> list[tuple[str, str, str]]:
 
 def test_the_tables_of_the_first_page_are_those_of_the_reports():
     text = (pages.ROOT / "README.md").read_text(encoding="utf-8")
-    assert text.count(": docs/first_page.py -->") == 3
+    assert text.count(": docs/_ext/first_page.py -->") == 3
     assert first_page.filled(text) == text
 
 
@@ -123,7 +122,7 @@ def test_a_ratio_of_the_first_page_is_that_of_the_report(words, cells):
 
 
 UNMEASURED = {
-    "bounds": {"1e-13", "1e-12", "1e-10", "1e-8", "1e-5"},
+    "bounds": {"1e-13", "1e-12", "1e-6", "1e-10", "1e-8", "1e-5"},
     "processors and vectors": {"512", "256", "5"},
     "lengths and orders": {"12,000", "4", "16", "200"},
     "versions and dates": {"3.11", "3", "2026", "3.0"},

@@ -1,14 +1,12 @@
-"""The tables of README.md, from those of the reports: ``python docs/first_page.py`` writes them into it."""
+"""Tables of README.md, from those of the reports: ``python docs/_ext/first_page.py`` writes them into it."""
 
 import re
-import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parent / "_ext"))
 from stored import Stored, tables
 
-README = Path(__file__).parents[1] / "README.md"
-MARKED = re.compile(r"(<!-- (\w+): docs/first_page.py -->\n\n).*?(\n\n<!-- end -->)", re.DOTALL)
+README = Path(__file__).parents[2] / "README.md"
+MARKED = re.compile(r"(<!-- (\w+): docs/_ext/first_page.py -->\n\n).*?(\n\n<!-- end -->)", re.DOTALL)
 
 FASTEST, BY_PROCESSOR = "The fastest setting, and the time", "The same ratios by kind of processor"
 SETTINGS = "The fastest settings with energy error"
