@@ -73,7 +73,10 @@ def test_the_page_of_tasks_is_what_is_stored(monkeypatch):
     monkeypatch.syspath_prepend(str(SCRIPTS))
     import run_all
 
-    assert set(json.loads(run_all.STORED.read_text(encoding="utf-8"))["tasks"]) == set(run_all.TASKS)
+    tasks = json.loads(run_all.STORED.read_text(encoding="utf-8"))["tasks"]
+    assert set(tasks) == set(run_all.TASKS)
+    for name, task in tasks.items():  # as many settings of every method
+        assert len({row["tried"] for row in task["rows"]}) == 1, name
     assert run_all.page() == run_all.PAGE.read_text(encoding="utf-8")
 
 
