@@ -45,11 +45,12 @@ def compare() -> Comparison:
         "HBVM", settings(run, *(integrators.HBVM(tol=tol) for tol in (1e-12, 1e-10, 1e-9, 1e-8))),
         lambda solution: np.abs(solution.y[-1] / EXACT - 1.0).max(),
     )  # fmt: skip
-    for library, method in (
-        ("SciPy's Radau", integrators.Radau), ("SciPy's LSODA", integrators.LSODA),
-        ("SUNDIALS' CVODE", integrators.CVODE),
-    ):  # fmt: skip
-        methods = [method(rtol=tol, atol=1e-3 * tol) for tol in (1e-11, 1e-10, 1e-9, 1e-8)]
+    for library, method, tolerances in (
+        ("SciPy's Radau", integrators.Radau, (1e-9, 1e-8, 1e-7, 1e-6)),
+        ("SciPy's LSODA", integrators.LSODA, (1e-11, 1e-10, 3e-10, 1e-9)),
+        ("SUNDIALS' CVODE", integrators.CVODE, (1e-11, 3e-11, 1e-10, 3e-10)),
+    ):
+        methods = [method(rtol=tol, atol=float(f"{tol / 1000:.0e}")) for tol in tolerances]
         made.add(
             library, settings(run, *methods),
             lambda solution: np.abs(solution.y[-1] / EXACT - 1.0).max(),
