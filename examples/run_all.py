@@ -28,8 +28,8 @@ same number of settings is tried, four where there is something to choose. The t
 those whose error is at most the requested one, or the most accurate where none is. Right-hand sides and
 Jacobians are compiled for every library; bodies in space are integrated with each library's own model of
 them. "First call" contains compilation, unless the machine has compiled the same before; "time" is the
-median of the others. Where other work took more than a tenth of a core, no time is shown and nothing is
-judged. This page is written by `make examples`.
+median of the others. Where other work took more than a tenth of a core, no time is shown, the choice of the
+setting is preliminary and nothing is judged. This page is written by `make examples`.
 """
 
 

@@ -120,7 +120,7 @@ class Comparison:
         if not self.accurate:
             return "none is accurate enough"
         if any(row.seconds is None for row in self.accurate):
-            return "accurate enough: " + ", ".join(row.library for row in self.accurate) + "; not timed"
+            return "Not timed; accurate enough: " + ", ".join(row.library for row in self.accurate)
         first, *others = self.accurate
         if not others:
             return f"only {first.library} is accurate enough"
