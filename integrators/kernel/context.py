@@ -164,7 +164,7 @@ class Context(Memory):
     # --- where it is ---
     h = Real()
     t0 = Real()
-    time_low = Real()  # what `t0` lacks, where steps vary
+    time_low = Real()  # what `t0` lacks
     n = Integer()  # steps since `t0`
     samples_written = Integer()  # samples
     state = Array(2, "padded")  # second-order form: blocks [p p p p q q q q]; first-order form: y

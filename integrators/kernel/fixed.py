@@ -11,7 +11,7 @@ from integrators.kernel.context import ADVANCE, ANEW, BUDGET, DENSE, DONE, PARTI
 from integrators.kernel.stepper import Ended, HBVMStepper
 from integrators.protocol import Array, Samples, Status
 from integrators.refusals import check_state, one_thread
-from integrators.running.times import plan
+from integrators.running.times import plan, rest
 
 MOST = 1 << 60  # steps or samples
 ROUNDINGS = 4  # units in the last place of time by which a step may seem to pass the end
@@ -21,8 +21,9 @@ FEW, GROWTH = 64, 4  # of them that are planned at a time after an event, and ho
 class FixedStepper(HBVMStepper):
     """A trajectory of HBVM(k, s) with fixed step size; see `HBVMStepper`.
 
-    The present time is ``t0 + n h`` with an integer n, never an accumulated sum. An event that changes the
-    state is where the steps are counted from: ``t0`` is its time.
+    The present time is ``t0 + n h`` with an integer n, never an accumulated sum; where steps of another
+    length begin, ``t0`` is a sum of two doubles. An event that changes the state is where the steps are
+    counted from: ``t0`` is its time.
     """
 
     @one_thread
@@ -68,15 +69,15 @@ class FixedStepper(HBVMStepper):
         """Take steps, ``most`` at most and none beyond the time ``end``; return them."""
         self._restore_length()
         if (end - self.t) * self._context.h < 0.0:
-            self._turn(self.t)
+            self._turn()
         return self._steps(self._context.n + 1, end, most)
 
     def _advance(self, grid: Array, sample: str) -> Samples:
         self._restore_length()
         t = self.t
         goal = self.destination if self.destination is not None and grid[-1] == t else grid[-1]
-        if (goal - t) * self._context.h < 0.0:  # steps are counted from here
-            self._turn(t)
+        if (goal - t) * self._context.h < 0.0:
+            self._turn()
         if sample == "steps":
             return self._steps(self._context.n + int(grid[0] != self.t), float(grid[-1]))
         return self._to(grid, {"stop": STOP, "dense": DENSE}.get(sample, PARTIAL))
@@ -90,10 +91,10 @@ class FixedStepper(HBVMStepper):
                 outcome = BUDGET
                 break
             piece = grid[done : done + size]
-            bases = np.zeros(piece.size) + ctx.t0
+            bases, low = np.full(piece.size, ctx.t0), np.full(piece.size, ctx.time_low)
             if between == STOP:
-                bases[1:] = piece[:-1]
-            steps, parts = plan(piece, bases, ctx.h)
+                bases[1:], low[1:] = piece[:-1], 0.0
+            steps, parts = plan(piece, bases, ctx.h, low)
             if between != STOP and parts[-1] and self._passes_end(steps[-1] + 1):
                 whole = int(
                     np.searchsorted(steps, steps[-1]) + np.count_nonzero(parts[steps == steps[-1]] == 0.0)
@@ -129,20 +130,27 @@ class FixedStepper(HBVMStepper):
             if outcome != DONE or reason is not None:
                 return outcome, reason
         assert self.destination is not None
-        self._count_from_here(self.destination - self.t)
+        self._count_from_here()
+        self._set_step(self._time_left(self.destination))
         return ANEW, reason
 
     def _restore_length(self) -> None:
         """Go on with steps of the usual length if the last one was shortened."""
         ctx, end = self._context, self.destination
-        if abs(ctx.h) != self._program.h and (ctx.n or end is None or end - ctx.t0 != ctx.h):
-            self._count_from_here(math.copysign(self._program.h, ctx.h))
+        if abs(ctx.h) != self._program.h and (ctx.n or end is None or self._time_left(end) != ctx.h):
+            self._count_from_here()
+            self._set_step(math.copysign(self._program.h, ctx.h))
 
-    def _count_from_here(self, h: float) -> None:
-        """Count steps of another length from the present on."""
-        self._context.t0, self._context.n = self.t, 0
+    def _time_left(self, end: float) -> float:
+        """Return the time from the present to a later one, rounded once."""
+        ctx = self._context
+        return rest(end, ctx.t0, ctx.n, ctx.h, ctx.time_low)
+
+    def _count_from_here(self) -> None:
+        """Count steps from the present on; what lay ahead is forgotten, since others will come."""
+        ctx, t = self._context, self.t
+        ctx.t0, ctx.time_low, ctx.n = t, -self._time_left(t), 0
         self._forget()
-        self._set_step(h)
 
     def _steps(self, first: int, end: float | None, most: int = MOST) -> Samples:
         """Take steps from number ``first`` on, ``most`` at most and none beyond ``end``; return them.
@@ -154,7 +162,7 @@ class FixedStepper(HBVMStepper):
         while not over:
             final, last_part = first + most - 1, 0.0
             if end is not None:
-                (count,), (part,) = plan(np.array([end]), np.array([ctx.t0]), ctx.h)
+                (count,), (part,) = plan(np.array([end]), np.array([ctx.t0]), ctx.h, ctx.time_low)
                 final, last_part = (int(count), part) if count < final else (final, 0.0)
             last = min(final, first + size - 1)
             targets = np.arange(first, last + 1)
@@ -191,17 +199,17 @@ class FixedStepper(HBVMStepper):
     def _look_at_rest(self, end: float) -> tuple[int, Ended | None]:
         """Look for events that change the state in a step to the end, which stays ahead if there is none."""
         h = self._context.h
-        self._count_from_here(end - self.t)
+        self._count_from_here()
+        self._set_step(self._time_left(end))
         part = np.array([self._context.h])
         _, outcome, reason = self._fill(DENSE, np.array([end]), np.zeros(1, dtype=np.int64), part)
         if outcome == ANEW:
             self._set_step(h)
         return outcome, reason
 
-    def _turn(self, t0: float) -> None:
-        """Reverse the direction, here, at time ``t0``; what lay ahead lies behind and is forgotten."""
+    def _turn(self) -> None:
+        """Reverse the direction, here."""
         ctx = self._context
-        ctx.t0, ctx.n = t0, 0
+        self._count_from_here()
         self._set_step(-math.copysign(self._program.h, ctx.h))
         ctx.events.acted = -math.copysign(math.inf, ctx.h)  # the same event may happen on the way back
-        self._forget()

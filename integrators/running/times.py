@@ -14,7 +14,7 @@ Counts = NDArray[np.int64]
 COUNTABLE = 2.0**53
 
 
-def plan(times: Array, bases: Array, h: float) -> tuple[Counts, Array]:
+def plan(times: Array, bases: Array, h: float, low: Array | float = 0.0) -> tuple[Counts, Array]:
     """Split each distance from a base into whole steps and a part of one.
 
     Parameters
@@ -23,13 +23,15 @@ def plan(times: Array, bases: Array, h: float) -> tuple[Counts, Array]:
         Times asked for and the times they are counted from.
     h : float
         Length of a step; negative backwards.
+    low : float or ndarray, shape (m,)
+        What the bases lack: they are ``bases + low``.
 
     Returns
     -------
     steps : ndarray of int, shape (m,)
         Whole steps that end at or before the time.
     parts : ndarray, shape (m,)
-        What is left of ``times - bases - steps * h``, without the rounding of these
+        What is left of ``times - bases - low - steps * h``, without the rounding of these
         operations; exactly 0 where the time is a step's end but for a few ulp.
 
     Raises
@@ -38,9 +40,9 @@ def plan(times: Array, bases: Array, h: float) -> tuple[Counts, Array]:
         If h is so small that the steps cannot be counted.
     """
     if times.size == 1:  # in a tenth of the time
-        count, part = _split(times.item(), bases.item(), h, _OfOne)
+        count, part = _split(times.item(), bases.item(), h, np.asarray(low).item(), _OfOne)
         return np.array([int(count)]), np.array([part])
-    counts, parts = _split(times, bases, h, _OfMany)
+    counts, parts = _split(times, bases, h, low, _OfMany)
     return counts.astype(np.int64), parts
 
 
@@ -73,18 +75,18 @@ def _check(count: float, h: float) -> None:
         raise InputError(f"h={abs(h)!r} would need {count:.1e} steps; take a larger h.")
 
 
-def _split(times: Any, bases: Any, h: float, functions: Any) -> tuple[Any, Any]:
+def _split(times: Any, bases: Any, h: float, low: Any, functions: Any) -> tuple[Any, Any]:
     """Return counts and parts of numbers or of arrays, with the functions ``of`` them."""
     count = functions.rint((times - bases) / h)
     _check(functions.largest(count), h)
-    parts = _rest(times, bases, count, h)
+    parts = rest(times, bases, count, h, low)
     close = abs(parts) <= 4.0 * functions.spacing(functions.maximum(abs(times), abs(bases)))
     count = functions.where(close | (parts * h >= 0.0), count, count - 1.0)
-    return count, functions.where(close, 0.0, _rest(times, bases, count, h))
+    return count, functions.where(close, 0.0, rest(times, bases, count, h, low))
 
 
-def _rest(times: Any, bases: Any, count: Any, h: float) -> Any:
-    """Return times - bases - count * h, rounded once (Dekker's sum and product)."""
+def rest(times: Any, bases: Any, count: Any, h: float, low: Any = 0.0) -> Any:
+    """Return times - bases - low - count * h, rounded once (Dekker's sum and product)."""
     gap = times - bases
     back = gap - times
     gap_error = (times - (gap - back)) - (bases + back)
@@ -92,6 +94,6 @@ def _rest(times: Any, bases: Any, count: Any, h: float) -> Any:
     split = 134217729.0  # 2^27 + 1
     high = split * count - (split * count - count)
     top = split * h - (split * h - h)
-    low, bottom = count - high, h - top
-    product_error = ((high * top - product) + high * bottom + low * top) + low * bottom
-    return ((gap - product) - product_error) + gap_error
+    rest_of_count, bottom = count - high, h - top
+    product_error = ((high * top - product) + high * bottom + rest_of_count * top) + rest_of_count * bottom
+    return ((gap - product) - product_error) + (gap_error - low)

@@ -45,6 +45,19 @@ def test_dates_and_long_intervals_are_not(method, t0, span):
     assert made.step().value == "running"
 
 
+@pytest.mark.parametrize("sample", ["partial", "stop", "dense"])
+@pytest.mark.parametrize("method", [HBVM(), HBVM(k=8, s=4, h=0.11), Gauss(s=8, h=0.11)], ids=repr)
+def test_the_start_of_an_autonomous_system_does_not_matter(method, sample):
+    """Before, fixed steps were wrong by 5e-11 at a Julian date, in the part of a step before the end."""
+    after = np.array([0.5, 1.25, 3.9375, 4.0])  # exactly so long after each of the starts
+    from_zero, late, early = (
+        integrate(KEPLER.replace(t0=t0, t_end=t0 + 4.0), method, t0 + after, sample=sample)
+        for t0 in (0.0, 2451545.0, -(2.0**21))
+    )
+    assert np.array_equal(late.y, from_zero.y)
+    assert np.array_equal(early.y, from_zero.y)
+
+
 @pytest.mark.parametrize("i", range(20))
 def test_a_late_start_is_right_or_refused(i):
     assert late_times.tried(np.random.default_rng([8, i])) == ""

@@ -9,7 +9,7 @@ from integrators.kernel.context import DONE, Context, Shape
 from integrators.kernel.engines import pull, record
 from integrators.kernel.native.field import compile_field
 from integrators.kernel.native.memory import aligned
-from integrators.kernel.step.rule import FIRST_RATE, LOG_RESIDUAL_VARYING, TOLERANCE
+from integrators.kernel.step.rule import FIRST_RATE, LOG_RESIDUAL_VARYING, STAGNATION, TOLERANCE
 from integrators.protocol import Array
 from problems import targets
 from problems.problem import System
@@ -96,12 +96,9 @@ class Adjoint:
             fixed["raw_matrix"] = tables.rounded(self._constants)
         fixed["extrapolation"] = tables.extrapolations(c) if c.route > tables.THROUGH else aligned(0)
         self.context = context = Context(own, fixed, {"padded": 2 * (-(-dim // 8) * 8)})
-        context.solver.tolerance, context.solver.log_residual, context.varying = (
-            TOLERANCE,
-            LOG_RESIDUAL_VARYING,
-            1,
-        )
-        context.solver.rate = FIRST_RATE
+        context.solver.tolerance, context.solver.stagnation = TOLERANCE, STAGNATION
+        context.solver.log_residual, context.solver.rate = LOG_RESIDUAL_VARYING, FIRST_RATE
+        context.varying = 1
         context.par[:] = par
         self._wanted = parameters and system.n_par > 0
         wanted = system.n_par if self._wanted else 0

@@ -56,7 +56,7 @@ class Frames:
         self.states = np.empty((marks.size, dim))
         self._sums = [self.growth, np.zeros_like(self.growth), np.zeros(marks.size), np.zeros(marks.size)]
         self.divergence = self._sums[2]
-        targets, _ = plan(marks, np.full(marks.size, ctx.t0), ctx.h) if not ctx.varying else (marks, None)
+        targets = marks if ctx.varying else plan(marks, np.full(marks.size, ctx.t0), ctx.h, ctx.time_low)[0]
         memory = self._memory = Frame(
             {
                 "dim": dim,

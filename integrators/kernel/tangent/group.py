@@ -71,9 +71,9 @@ class Group:
         self.own, self.partial = (fresh[count, moves].copy() for _ in contexts)
         for context, base in zip((self.own, self.partial), contexts, strict=True):
             context.point_to(base.used_tables)
-            solver = context.solver
-            solver.tolerance, solver.log_residual = base.solver.tolerance, base.solver.log_residual
-            solver.rate, context.varying = FIRST_RATE, base.varying
+            solver, rule = context.solver, base.solver
+            solver.tolerance, solver.stagnation = rule.tolerance, rule.stagnation
+            solver.log_residual, solver.rate, context.varying = rule.log_residual, FIRST_RATE, base.varying
         self._state = self.own.state  # where it lies as long as no step is taken
         self._slots = {
             context: (context.par, context.factors.velocity) for context in (self.own, self.partial)
