@@ -120,18 +120,27 @@ for _function, _name in (
     (math.sqrt, "sqrt"),
     (abs, "fabs"),
     (math.fabs, "fabs"),
-    (np.floor, "floor"),
 ):
     register(_function, 1, Lanes, intrinsic_call(_name))
 
 
 def _sign(builder: Any, x: Any) -> Any:
-    zero, one, minus = (splat(builder, ir.Constant(DOUBLE, v), x.type.count) for v in (0.0, 1.0, -1.0))
+    zero, one, minus = (ir.Constant(DOUBLE, value) for value in (0.0, 1.0, -1.0))
+    if x.type != DOUBLE:
+        zero, one, minus = (splat(builder, value, x.type.count) for value in (zero, one, minus))
     below = builder.select(builder.fcmp_ordered("<", x, zero), minus, builder.fadd(x, zero))  # -0.0 to 0.0
     return builder.select(builder.fcmp_ordered(">", x, zero), one, below)
 
 
-register(np.sign, 1, Lanes, _sign)
+# NumPy's own functions have no meaning on numbers here, where formulas with branches need one.
+for _function, _emit in ((np.floor, intrinsic_call("floor")), (np.sign, _sign)):
+    register(_function, 1, Lanes, _emit)
+    type_callable(_function)(
+        lambda context: lambda x: types.float64(types.float64) if x == types.float64 else None
+    )
+    lower_builtin(_function, types.float64)(
+        lambda context, builder, sig, args, emit=_emit: emit(builder, *args)
+    )
 
 
 # --- explicit operations --------------------------------------------------------------------------

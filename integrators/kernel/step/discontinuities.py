@@ -38,9 +38,20 @@ def has_discontinuity(ctx, ends):
                 discontinuities.boundary = SEEN
             return False
         return jumps_at_an_end(ctx, suspect)
-    if surfaces.crossed == 0:
-        record(ctx, ctx.t0, ctx.h)
+    record_unknown(ctx)
     return True
+
+
+@compiled
+def record_unknown(ctx):
+    """Record a discontinuity in the solved step, unless that lies beside a breakpoint or crosses a surface.
+
+    There it is known, and rounding may let the field switch a little earlier or later; what else is in the
+    step is found by the shorter ones that follow.
+    """
+    known = ctx.surfaces.crossed or ctx.discontinuities.boundary == START or ends_at_break(ctx)
+    if not known:
+        record(ctx, ctx.t0, ctx.h)
 
 
 @compiled
@@ -61,8 +72,7 @@ def jumps_at_an_end(ctx, suspect):
         return False
     if not differs_at_an_end(ctx):
         return discontinuities.undone == 1
-    if ctx.surfaces.crossed == 0:
-        record(ctx, ctx.t0, ctx.h)
+    record_unknown(ctx)
     return True
 
 
@@ -271,7 +281,7 @@ def is_smooth_to_end(ctx):
         return True
     if not differs_at_an_end(ctx):
         return True
-    record(ctx, ctx.t0, ctx.h)
+    record_unknown(ctx)
     ctx.controller.next_length = SHRINK * ctx.h
     forget(ctx)
     return False

@@ -1,4 +1,4 @@
-"""An oscillator that starts at a late time: it is right, by SciPy to the spacing of doubles there, or refused.
+"""An oscillator that starts at a late time: it is right, by SciPy to the spacing of doubles, or refused.
 
 ``python -m tests.faults.search.late_times 500 3`` tries 500 of them from seed 3.
 """
