@@ -92,8 +92,8 @@ WIDTH = 1e-3
 
 @pytest.mark.parametrize("condition", PULSES.values(), ids=PULSES)
 def test_periodic_pulses_are_known_and_no_discontinuity_is_told(condition):
-    # Before, "floor" and "sign" were numba's errors beside a branch, and of the cosine's pulse at t = 0, whose
-    # edges rounding moves by 5e-15, one was told.
+    # Before, "floor" and "sign" were errors of numba beside a branch, and of the cosine's pulse at t = 0,
+    # whose edges rounding moves by 5e-15, one was told.
     system = VectorField(lambda t, y, m: [m.where(condition(t, m), 1.0 / WIDTH, 0.0) - y[0]], dim=1)
     made = integrate(Problem(system, y0=[0.0], t0=-0.5, t_end=9.5), HBVM(), [9.5])
     each = (1.0 - np.exp(-WIDTH)) / WIDTH * np.exp(WIDTH - 9.5 + np.arange(10))
