@@ -37,6 +37,7 @@ extensions = [
     "formulas",
     "made",
     "navigation",
+    "panels",
     "reports",
 ]
 exclude_patterns = ["_build", "_ext", "reference/made"]
