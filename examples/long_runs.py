@@ -30,9 +30,9 @@ def compare() -> Comparison:
     for library, methods in (
         ("HBVM", [integrators.HBVM(tol=tol) for tol in (3e-16, 1e-13, 1e-11, 1e-10)]),
         ("Gauss", [integrators.Gauss(s=8, h=h) for h in (1.2, 1.5, 1.8, 2.2)]),
-        ("REBOUND's IAS15", [integrators.IAS15(epsilon=epsilon) for epsilon in (1e-9, 1e-6, 1e-4, 1e-2)]),
-        ("REBOUND's WHFast", [WHFAST(h=h) for h in (0.05, 0.125, 0.2, 0.3)]),
-        ("REBOUND's SABA", [integrators.SABA(h=h) for h in (0.25, 0.5, 0.75, 1.0)]),
+        ("REBOUND's IAS15", [integrators.IAS15(epsilon=epsilon) for epsilon in (1e-7, 1e-6, 1e-5, 1e-4)]),
+        ("REBOUND's WHFast", [WHFAST(h=h) for h in (0.2, 0.3, 0.4, 0.5)]),
+        ("REBOUND's SABA", [integrators.SABA(h=h) for h in (0.75, 1.0, 1.25, 1.5)]),
     ):
         made.add(
             library, settings(run, *methods),
