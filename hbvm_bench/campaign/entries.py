@@ -37,41 +37,35 @@ class Limits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     compile_seconds: Positive = 900.0
 
 
-class TimingPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The serial timing pass: every round visits every case once, in a fresh process.
+class TimingPlan(msgspec.Struct, frozen=True, kw_only=True):
+    """The serial timing pass: one process takes all cases of a problem in turn, alone on the machine.
+
+    Ratios within rounds then say more than seconds do: a machine that changes its speed touches all alike.
 
     Attributes
     ----------
     rounds : int
-        Rounds over all cases; a machine that changes its speed touches all alike. 0: no timing.
-    samples : int
-        Samples of each case in one round.
+        Rounds over all cases, each with one sample of every case. 0: no timing.
     shortest : float
         A sample repeats the integration until it lasts this many seconds.
     budget : float
-        Seconds of sampling per case and round; at least one sample is taken. Of interleaved
-        times: per case, so that slow ones take part in fewer rounds.
-    interleaved : bool
-        Whether one process takes all cases of a problem in turn, one sample of each in every
-        round, instead of a process for every visit: ratios within rounds then say more.
+        Seconds of sampling per case; slow ones take part in fewer rounds.
     order : {"shuffled", "alternating"}
-        Of interleaved rounds: anew in each, or every other one backwards.
+        Of the cases in a round: anew in each, or every other one backwards.
     clock : {"wall", "thread", "process"}
-        Of interleaved times: of the wall, or CPU time of this thread, or for all threads
-        of this process, in which other work on the machine does not count.
+        Of the wall, or CPU time of this thread, or for all threads of this process, in which other work on
+        the machine does not count.
     compilations : int
-        Of interleaved times: fresh processes with empty caches among which the rounds are shared, for one
-        compilation of a method may be slower than the next. Those that choose a setting do not compare it.
+        Fresh processes with empty caches among which the rounds are shared, for one compilation of a method
+        may be slower than the next. Those that choose a setting do not compare it.
     front : bool
         Whether a setting that the first compilation shows to be far behind another one of its method is not
         timed again; see `hbvm_bench.run.front`.
     """
 
     rounds: Annotated[int, Meta(ge=0, le=10_000)] = 3
-    samples: Annotated[int, Meta(ge=1, le=10_000)] = 2
     shortest: Positive = 0.02
     budget: Positive = 8.0
-    interleaved: bool = False
     order: Literal["shuffled", "alternating"] = "shuffled"
     clock: Literal["wall", "thread", "process"] = "wall"
     compilations: Annotated[int, Meta(ge=1, le=100)] = 1

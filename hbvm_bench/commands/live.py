@@ -11,7 +11,7 @@ from rich.text import Text
 
 from hbvm_bench.campaign.identity import Resolved
 from hbvm_bench.report.terminal import console
-from hbvm_bench.run.task import Planned
+from hbvm_bench.run.task import Request
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries.rows import seconds, status_of
 
@@ -27,8 +27,7 @@ class Live:
         self._start = time.monotonic()
         self._title = ""
         self._total = self._count = 0
-        self._since: dict[str, tuple[Resolved | Planned, float]] = {}
-        self._round = -1
+        self._since: dict[str, tuple[Resolved | Request, float]] = {}
         self._told = self._start
         self._live = RichLive(
             get_renderable=self._render, console=self._console, transient=True, refresh_per_second=2
@@ -49,7 +48,7 @@ class Live:
         kept = f", {done} already there" if done else " to do"
         self._console.print(f"{title}: {self._total}{kept}")
 
-    def running(self, cases: Sequence[Resolved | Planned]) -> None:
+    def running(self, cases: Sequence[Request]) -> None:
         """Say which cases run now."""
         now = time.monotonic()
         self._since = {case.id: self._since.get(case.id, (case, now)) for case in cases}
@@ -69,12 +68,9 @@ class Live:
         )
         self._say_sometimes(self._summary())
 
-    def visit(self, round_: int, resolved: Resolved) -> None:
-        """Say which case is timed now, in which round from 0."""
+    def visit(self, resolved: Resolved) -> None:
+        """Say whose cases are timed now: the first of its problem's."""
         self.visited()
-        if round_ != self._round:
-            self._round = round_
-            self._console.print(f"  round {round_ + 1}")
         self._since = {resolved.id: (resolved, time.monotonic())}
         self._say_sometimes(self._summary())
 

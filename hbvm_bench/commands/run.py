@@ -19,9 +19,9 @@ from hbvm_bench.campaign.spec import file_of as python_file_of
 from hbvm_bench.commands.live import Live
 from hbvm_bench.measure import reading
 from hbvm_bench.report import terminal
-from hbvm_bench.run import checked, computing, executors, loop, references, supervise, timing_pass
+from hbvm_bench.run import checked, child, computing, executors, loop, references, timing_pass
 from hbvm_bench.run.executors import Pool
-from hbvm_bench.run.task import InterruptedRunError, Planned, UnfinishedRunError
+from hbvm_bench.run.task import InterruptedRunError, Request, UnfinishedRunError, request_of
 from hbvm_bench.store.files import ensure_writable
 from hbvm_bench.store.store import Index, Store
 from problems.errors import InputError
@@ -245,7 +245,7 @@ def _say(sentence: str) -> None:
 
 
 def _given_up(why: str, ids: list[str], store: Store, code: int) -> typer.Exit:
-    supervise.stop_all()
+    child.stopping.set()
     kept = sum(store.load(key) is not None for key in ids)
     done = f"{why}: {kept} of {len(ids)} cases are kept in {store.directory}"
     _say(f"{done}; run the same command again to go on.")
@@ -281,26 +281,27 @@ def _campaign(
 def _run(
     campaign: Campaign,
     cases: list[Resolved],
-    computations: list[Planned],
+    computations: list[Request],
     store: Store,
     pool: Pool,
     timing: bool,
 ) -> None:
-    supervise.allow()
+    child.stopping.clear()
     missing = [case for case in cases if not loop.is_kept(case, store, campaign.limits)]
     with Live() as live:
         try:
             live.phase(f"measuring {pool.where}", len(missing), len(cases) - len(missing))
-            for record in loop.run_accuracy(missing, store, campaign.limits, pool, live.running):
+            requests = [request_of(case, campaign.limits) for case in missing]
+            for record in loop.run_accuracy(requests, store, pool, live.running):
                 live.case(record)
             if left := computing.missing(computations, store):
                 live.phase("computing", len(left), len(computations) - len(left))
-                for record in computing.run(left, store, campaign, pool, live.running):
+                for record in computing.run(left, store, pool, live.running):
                     live.case(record)
             if timing:
                 _time(campaign, cases, store, live)
         except BaseException:
-            supervise.stop_all()  # or the executor would wait for the ends of its cases
+            child.stopping.set()  # or the executor would wait for the ends of its cases
             raise
         live.say(f"done in {live.elapsed:.0f} s; results in {store.directory}")
 
@@ -311,6 +312,6 @@ def _time(campaign: Campaign, cases: list[Resolved], store: Store, live: Live) -
         return
     if old := timing_pass.outdated(cases, store, campaign.timing):
         live.say(f"the plan of the timing has changed: {old} cases are timed again")
-    live.phase("timing, one at a time", visits, 0)
+    live.phase("timing, problem by problem", visits, 0)
     timing_pass.time_cases(cases, store, campaign.timing, campaign.limits, live.visit)
     live.visited()

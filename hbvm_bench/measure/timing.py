@@ -1,6 +1,6 @@
 """Warm seconds of whole integrations, honestly: compiled before, without output, samples kept.
 
-A run is timed alone in its process, or together with all settings of its problem, in turn.
+All settings of a problem are timed in one process, in turn.
 """
 
 import gc
@@ -25,7 +25,6 @@ from integrators.protocol import MethodBase, Program, Samples, Status
 from problems.problem import Problem
 
 WARM_UP = 0.01  # of the interval: everything has run once
-SLOW = 1.0  # seconds; an integration longer than this needs no second warm-up
 CALIBRATION_LOOPS = 800_000
 ORDER_SEED = 2026
 NOWHERE = 1e-7  # of the interval: what a call takes that goes next to nowhere; IAS15 may hang in 1e-9 of it
@@ -185,32 +184,6 @@ class Spread:
 def repeats_for(seconds: float, shortest: float) -> int:
     """Return how many runs of ``seconds`` make a sample that lasts ``shortest``, with a reserve."""
     return max(1, math.ceil(1.2 * shortest / max(seconds, 1e-9))) if seconds < shortest else 1
-
-
-def time_alone(run: Timeable, plan: TimingPlan) -> Timing:
-    """Take the samples of one round of a run that is alone in its process.
-
-    There is no round, with the reason, where the integration does not reach the end.
-    """
-    run.until(WARM_UP).seconds()
-    wall, busy = time.perf_counter(), time.process_time()
-    calibration = [calibrate()]
-    first, reached = run.seconds()
-    if reached.status is not Status.FINISHED:
-        return _unfinished(reached)
-    repeats = repeats_for(first, plan.shortest)
-    samples = [first] if first > SLOW else []
-    calibration += [calibrate()] if samples else []
-    spent = sum(samples)
-    while len(samples) < plan.samples and (not samples or spent + first * repeats <= plan.budget):
-        mean, _ = run.seconds(repeats)
-        samples.append(mean)
-        calibration.append(calibrate())
-        spent += mean * repeats
-    wall, busy = time.perf_counter() - wall, time.process_time() - busy
-    fixed = {"repeats": repeats, "compile": _compilation(run)}
-    share = round(busy / wall, 3)
-    return Timing(rounds=[TimingRound(samples=samples, calibration=calibration, share=share, **fixed)])
 
 
 def time_together(

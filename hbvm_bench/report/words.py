@@ -93,14 +93,9 @@ WEAKNESSES = _paragraphs(WEAKNESSES_TEXT)
 def timing(plan: TimingPlan) -> str:
     """Return how a campaign takes times."""
     alike = ", so that a change of the machine's speed affects all cases alike."
-    if plan.interleaved:
-        rounds = f"in {plan.rounds} rounds (slow cases in fewer)"
-        visits = f"One process takes all cases of a problem in turn, {rounds}{alike}"
-    elif plan.rounds > 1:
-        visits = f"Each of {plan.rounds} rounds visits every case once, in a fresh process{alike}"
-    else:
-        visits = "Every case is visited once, in a fresh process."
-    if plan.interleaved and plan.clock != "wall":
+    rounds = f"in {plan.rounds} rounds (slow cases in fewer)" if plan.rounds > 1 else "in one round"
+    visits = f"One process takes all cases of a problem in turn, {rounds}{alike}"
+    if plan.clock != "wall":
         visits += f" The seconds are CPU time of this {plan.clock}: waiting does not count."
     if plan.front:
         visits += (

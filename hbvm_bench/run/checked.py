@@ -83,12 +83,6 @@ def _timing(plan: TimingPlan) -> None:
         )
     if plan.front and plan.compilations < 2:
         raise InputError("front = true of timing needs compilations = 2 or more, the first of which tells.")
-    for name in ("samples",) if plan.interleaved else ("order", "clock"):
-        if (given := getattr(plan, name)) != getattr(TimingPlan(), name):
-            other = str(not plan.interleaved).lower()
-            raise InputError(
-                f"{name}={given!r} of timing belongs to interleaved = {other}; leave it out, or set that."
-            )
 
 
 def _settings(method: MethodEntry) -> None:

@@ -13,7 +13,6 @@ from queue import SimpleQueue
 from typing import Any
 
 from hbvm_bench.measure import machine
-from hbvm_bench.run import warm
 from hbvm_bench.run.task import stay_on
 from problems.errors import InputError, MissingLibraryError
 
@@ -97,11 +96,8 @@ def _local(jobs: int) -> Iterator[Pool]:
         if jobs <= len(cores):  # with more, the system shares the cores better
             stay_on(free.get_nowait())
 
-    try:
-        with ThreadPoolExecutor(max_workers=jobs, thread_name_prefix="case", initializer=settle) as executor:
-            yield Pool(executor, lambda: jobs)
-    finally:
-        warm.close()
+    with ThreadPoolExecutor(max_workers=jobs, thread_name_prefix="case", initializer=settle) as executor:
+        yield Pool(executor, lambda: jobs)
 
 
 @contextmanager

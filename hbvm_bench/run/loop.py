@@ -4,17 +4,14 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
-from typing import TypeVar
 
 from hbvm_bench.campaign.file import Campaign, Limits
 from hbvm_bench.campaign.identity import Resolved, resolve
 from hbvm_bench.run.executors import Pool
-from hbvm_bench.run.task import InterruptedRunError, Planned, UnfinishedRunError, execute, task_of
-from hbvm_bench.store.records import COMPILING, DIED, Record, decoded
+from hbvm_bench.run.task import InterruptedRunError, Request, UnfinishedRunError, execute
+from hbvm_bench.store.records import COMPILING, DIED, Record
 from hbvm_bench.store.store import Store
 from problems.errors import InputError
-
-Job = TypeVar("Job", bound=Resolved | Planned)
 
 ATTEMPTS = 3  # of a case whose process dies, or that an executor loses with the machine that had it
 PATIENCE = 1.0  # seconds between two looks at how many slots there are
@@ -56,19 +53,18 @@ def is_kept(resolved: Resolved, store: Store, limits: Limits) -> bool:
 
 
 def run_accuracy(
-    cases: Sequence[Job],
+    requests: Sequence[Request],
     store: Store,
-    limits: Limits,
     pool: Pool,
-    tell: Callable[[Sequence[Job]], None] = lambda running: None,
+    tell: Callable[[Sequence[Request]], None] = lambda running: None,
 ) -> Iterator[Record]:
     """Run cases side by side, store each as it finishes, and yield its record.
 
     This process alone writes in the store; the executor's may be other machines. The executor has as many
     cases as it has slots, and never a long queue, so that what runs is known, and little is left
-    behind where the run is stopped. ``tell`` is called with the running cases, whenever they change
-    and about once a second. A case whose process died runs again, after the others; `ATTEMPTS` times in all,
-    then its record is stored as it is.
+    behind where the run is stopped. Those of one library follow each other, whose processes serve many.
+    ``tell`` is called with the running cases, whenever they change and about once a second. A case whose
+    process died runs again, after the others; `ATTEMPTS` times in all, then its record is stored as it is.
 
     Raises
     ------
@@ -78,16 +74,17 @@ def run_accuracy(
         If the executor is gone, or one of its machines has other sources or versions (it would
         refuse one case after the other); and after all others, if it could not run some cases.
     """
-    waiting = deque(cases)
-    running: dict[Future[tuple[bytes, bytes]], Job] = {}
+    libraries = list(dict.fromkeys(request.rows[0].library for request in requests))
+    waiting = deque(sorted(requests, key=lambda request: libraries.index(request.rows[0].library)))
+    running: dict[Future[tuple[Record, bytes]], Request] = {}
     attempts: Counter[str] = Counter()
     failures: list[str] = []
     try:
         while waiting or running:
             slots = pool.slots()
             while waiting and len(running) < slots:
-                resolved = waiting.popleft()
-                running[_submitted(pool, task_of(resolved, limits))] = resolved
+                request = waiting.popleft()
+                running[_submitted(pool, request)] = request
             tell(list(running.values()))
             if why := pool.lost():
                 raise UnfinishedRunError(why)
@@ -96,18 +93,17 @@ def run_accuracy(
                 continue
             done, _ = wait(running, timeout=PATIENCE, return_when=FIRST_COMPLETED)
             for future in done:
-                resolved = running.pop(future)
+                request = running.pop(future)
                 measured, series, failure = None, b"", ""
                 try:
-                    record, series = future.result()
-                    measured = decoded(record, Record)
+                    measured, series = future.result()
                 except (InterruptedRunError, InputError, UnfinishedRunError):
                     raise
                 except (Exception, CancelledError) as error:  # of the executor, not of the case
                     failure = f"{type(error).__name__}: {error}".rstrip(": ")
-                attempts[resolved.id] += 1
-                if (measured is None or died(measured)) and attempts[resolved.id] < ATTEMPTS:
-                    waiting.append(resolved)
+                attempts[request.id] += 1
+                if (measured is None or died(measured)) and attempts[request.id] < ATTEMPTS:
+                    waiting.append(request)
                 elif measured is None:
                     failures.append(failure)
                 else:
@@ -122,9 +118,9 @@ def run_accuracy(
         raise UnfinishedRunError(f"{count} could not be run: {reasons}")
 
 
-def _submitted(pool: Pool, task: bytes) -> Future[tuple[bytes, bytes]]:
+def _submitted(pool: Pool, request: Request) -> Future[tuple[Record, bytes]]:
     try:
-        return pool.executor.submit(execute, task)
+        return pool.executor.submit(execute, request)
     except Exception as error:  # broken or shut down, each executor in its own words
         raise UnfinishedRunError(
             f"the executor takes no more cases: {type(error).__name__}: {error}"

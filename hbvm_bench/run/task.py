@@ -1,46 +1,29 @@
-"""One case, measured in a process of its own under hard limits: the task that executors run."""
+"""What is asked of a process that runs cases, what it answers, and the row that comes of it."""
 
-import contextlib
 import os
 import platform
-import sys
 import tempfile
 import threading
-from collections.abc import Mapping
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TypeVar
 
 import msgspec
 from msgspec.structs import replace
 
-from hbvm_bench.campaign import own
-from hbvm_bench.campaign.file import Case, Limits
-from hbvm_bench.campaign.identity import (
-    Resolved,
-    is_ours,
-    kernel_digest,
-    of_method,
-    resolve,
-    version_of,
-    versions_of,
-)
-from hbvm_bench.campaign.spec import parse_spec
+from hbvm_bench.campaign import folder, own
+from hbvm_bench.campaign.file import Case, Limits, TimingPlan
+from hbvm_bench.campaign.identity import Resolved, is_ours, kernel_digest, of_method, versions_of
 from hbvm_bench.measure import machine
-from hbvm_bench.reference import solutions
-from hbvm_bench.run import ending, supervise, warm
-from hbvm_bench.run.supervise import Ended
-from hbvm_bench.run.worker import COMPILED, ENVIRONMENT, NO_ROOM, REPLY, STALE, Computation, Request
+from hbvm_bench.measure.computation import Task
+from hbvm_bench.run import child
+from hbvm_bench.run.child import Child, Ended
 from hbvm_bench.store import arrays, records
-from hbvm_bench.store.records import COMPILING, DIED, Outcome, Record, Result
-from problems.errors import InputError
+from hbvm_bench.store.records import COMPILING, DIED, Outcome, Record, Result, Timing
+from problems.errors import printable
 
-T = TypeVar("T")
 LOG_LENGTH = 4000  # characters kept of what a crashed process printed
-NO_RESULT = "the process left no readable result"
-
-_thread = threading.local()
+ENDINGS = {"timeout": "the time limit", "compiling": "still compiling", "memory": "the memory limit"}
+NO_RESULT = Result(outcome="crashed", reason="the process left no readable result", status=DIED)
 
 
 class InterruptedRunError(Exception):
@@ -51,45 +34,122 @@ class UnfinishedRunError(Exception):
     """Some cases could not be run at all; what finished is in the store."""
 
 
-@dataclass(frozen=True)
-class Planned:
-    """A computation of a study that is to run, as `Resolved` is a case."""
+class Computation(msgspec.Struct, frozen=True, kw_only=True):
+    """One computation of a study.
 
-    case: Case  # whose method is the key
-    id: str
-    computation: Computation
-
-
-def task_of(resolved: Resolved | Planned, limits: Limits) -> bytes:
-    """Return the JSON of the `Request` for an accuracy run, which `execute` takes."""
-    if isinstance(resolved, Planned):
-        cases = {resolved.id: resolved.case}
-        limits = replace(limits, wall_seconds=resolved.computation.limit)
-        return msgspec.json.encode(Request(cases=cases, limits=limits, computation=resolved.computation))
-    request = Request(
-        cases={resolved.id: resolved.case},
-        limits=limits,
-        versions=versions_of(resolved.method),
-        beside=own.beside(resolved.problem),
-    )
-    return msgspec.json.encode(request)
-
-
-def execute(task: bytes) -> tuple[bytes, bytes]:
-    """Measure one case in a process of its own.
-
-    Top-level, from bytes to bytes and without a directory, so that any
-    `concurrent.futures.Executor` can run it, on this machine or another.
-
-    Parameters
+    Attributes
     ----------
-    task : bytes
-        JSON of a `Request`.
+    folder, place : str
+        Of the function that lists them, as in ``./blocks.py:tasks``.
+    key : str
+        Which of them.
+    quick : bool
+        Whether the run is quick.
+    timed : bool
+        Whether it takes times: it finds nothing loaded then, and nothing runs beside it.
+    """
+
+    folder: str
+    place: str
+    key: str
+    quick: bool
+    timed: bool = False
+
+    def tasks(self) -> dict[str, Task]:
+        """Return the tasks of the study, by their keys."""
+        return {task.key: task for task in folder.named(self.place, Path(self.folder))(self.quick)}
+
+
+class Request(msgspec.Struct, frozen=True, kw_only=True):
+    """What travels to a process, and before that to whichever machine shall start it.
+
+    Attributes
+    ----------
+    rows : list of Record
+        The rows that are to be filled: of one case to be measured, or of several to be timed together. Their
+        ids must come out the same there.
+    limits : Limits
+        Wall time and memory.
+    plan : TimingPlan or None
+        What to time; ``None`` for the accuracy run.
+    beside : own.Beside
+        What must be known of their problem.
+    rounds : list of int
+        Of interleaved times, those that are this process's.
+    compilation : int
+        Which of the plan's compilations they are of.
+    core : int or None
+        The core to stay on.
+    computation : Computation or None
+        What to do instead of an integration.
+    """
+
+    rows: list[Record]
+    limits: Limits
+    plan: TimingPlan | None = None
+    beside: own.Beside = own.Beside()
+    rounds: list[int] = []
+    compilation: int = 0
+    core: int | None = None
+    computation: Computation | None = None
+
+    @property
+    def id(self) -> str:
+        """The id of its first row."""
+        return self.rows[0].id
+
+    @property
+    def case(self) -> Case:
+        """The case of its first row."""
+        return self.rows[0].case
+
+
+class Answer(msgspec.Struct, frozen=True, kw_only=True):
+    """What a process says of a request.
+
+    Attributes
+    ----------
+    refusal : str
+        Why nothing of it can be done in this place; empty where it was.
+    result : bytes
+        JSON of the `Result` of the case.
+    series : bytes
+        Its arrays, as `hbvm_bench.store.arrays.encode` makes them; empty where there are none.
+    timings : bytes
+        JSON of the `Timing` of each row.
+    """
+
+    refusal: str = ""
+    result: bytes = b""
+    series: bytes = b""
+    timings: bytes = b""
+
+
+def request_of(resolved: Resolved, limits: Limits) -> Request:
+    """Return what is asked for an accuracy run of a case."""
+    method = resolved.method
+    row = Record(
+        id=resolved.id,
+        case=resolved.case,
+        **of_method(method),
+        result=NO_RESULT,
+        limits=limits,
+        versions=versions_of(method),
+        kernel=kernel_digest() if is_ours(method) else "",
+    )
+    return Request(rows=[row], limits=limits, beside=own.beside(resolved.problem))
+
+
+def execute(request: Request) -> tuple[Record, bytes]:
+    """Measure one case in a process under hard limits.
+
+    Top-level and without a directory, so that any `concurrent.futures.Executor` can run it, on this machine
+    or another. The process serves the next case of this thread too, where that is one of the same library.
 
     Returns
     -------
-    record : bytes
-        JSON of a `Record`: whatever happens to the process is one, with its reason.
+    row : Record
+        Whatever happens to the process is one, with its reason.
     series : bytes
         As `hbvm_bench.store.arrays.encode` makes them; empty where there are none.
 
@@ -99,141 +159,71 @@ def execute(task: bytes) -> tuple[bytes, bytes]:
         If the run was stopped meanwhile.
     UnfinishedRunError
         If the case could not be run here at all.
-    problems.errors.InputError
-        If the sources changed meanwhile.
     """
-    with solutions.apart():  # this may be a process that works for several runs
-        return _executed(msgspec.json.decode(task, type=Request))
-
-
-def _executed(asked: Request) -> tuple[bytes, bytes]:
-    own.add_known(asked.beside)
-    ((key, case),) = asked.cases.items()
-    if (computation := asked.computation) is not None:
-        versions = {"python": platform.python_version(), "hbvm-bench": version_of("hbvm-bench")}
-        said = {"case": case, "role": "ours", "library": "hbvm-bench", "order": None, "versions": versions}
-        said["kernel"] = kernel_digest()
-        loads = None if computation.timed else ("a study", computation.folder)
-    else:
-        try:
-            resolved = resolve(case)
-        except InputError as error:
-            raise UnfinishedRunError(f"{platform.node()} cannot run it: {error}") from None
-        if resolved.id != key:
-            raise UnfinishedRunError(_difference(asked.versions, resolved))
-        case, method = resolved.case, resolved.method
-        said = {"case": case, **of_method(method), "versions": versions_of(method)}
-        said["kernel"] = kernel_digest() if is_ours(method) else ""
-        loads = method.library, parse_spec(case.problem).name
-    with tempfile.TemporaryDirectory(prefix="hbvm-bench-") as scratch:
-        request = msgspec.structs.replace(asked, cases={key: case}, core=getattr(_thread, "core", None))
-        ended = start(Path(scratch), request, loads)
-        result, series = _result(Path(scratch), ended, asked.limits)
-    if result.reason == STALE:
-        raise InputError(STALE)
-    if ended.code == NO_ROOM:
-        raise UnfinishedRunError(
-            f"there is no room for the results of a case on {platform.node()}; make some in "
-            f"{tempfile.gettempdir()} and in the cache, and run the same command again"
-        )
-    record = Record(
-        id=key,
-        **said,
+    (row,) = request.rows
+    whole = replace(request, core=_here.core)
+    ended, answer = asked(_here.child(request), whole)
+    result, series = _result(ended, answer, request.limits)
+    made = replace(
+        row,
         result=result,
-        limits=asked.limits,
         seconds=round(ended.seconds, 3),
         peak_memory_gib=round(ended.peak_gib, 3),
-        log=ended.output[-LOG_LENGTH:] if result.outcome == "crashed" else "",
+        log=printable(ended.output[-LOG_LENGTH:]) if result.outcome == "crashed" else "",
         machine=machine.describe(),
         finished=datetime.now(UTC).isoformat(timespec="seconds"),
     )
-    return msgspec.json.encode(record), series
+    return made, series
 
 
-def stay_on(core: int) -> None:
-    """Let the cases that this thread starts stay on one core."""
-    _thread.core = core
-
-
-def empty_caches(directory: Path) -> dict[str, str]:
-    """Return the environment in which every library compiles anew: its caches are in this directory.
-
-    All libraries keep their compiled code below the user's own directories, so these are moved.
-    """
-    return {
-        "HOME": str(directory),
-        "XDG_CACHE_HOME": str(directory / "cache"),
-        "HBVM_BENCH_CACHE": str(directory / "kernel"),
-        "NUMBA_CACHE_DIR": str(directory / "numba"),
-    }
-
-
-def start(
-    scratch: Path,
-    request: Request,
-    loads: tuple[str, str] | None = None,
-    environment: Mapping[str, str] | None = None,
-) -> Ended:
-    """Start the worker process of a request and wait for its end.
-
-    Parameters
-    ----------
-    scratch : Path
-        An empty directory, where it writes.
-    request : Request
-        What it is asked to do, and under which limits.
-    loads : (str, str), optional
-        Library and problem of a case that may find loaded what others of both have loaded. By
-        default the process begins with nothing, as whatever is timed does.
-    environment : mapping, optional
-        What is added to the environment of a process that begins with nothing.
+def asked(process: Child, request: Request) -> tuple[Ended, Answer]:
+    """Ask a process, and return how that ended and what it answered.
 
     Raises
     ------
     InterruptedRunError
         If the run was stopped.
+    UnfinishedRunError
+        If it is not possible in this place.
     """
-    path, compiled = scratch / "request.json", scratch / COMPILED
-    path.write_bytes(msgspec.json.encode(request))
-    ended = None
-    if loads is not None and warm.possible():
-        with contextlib.suppress(OSError), warm.fork_server(ENVIRONMENT) as server:
-            child = server.start(path, *loads)
-            ended = supervise.watch(child, request.limits, compiled)
-            if child.lost:
-                if ended.cause == "exit":
-                    ended = None
-                    compiled.unlink(missing_ok=True)
-                raise ConnectionError  # the fork server has ended
-    if ended is None:
-        command = [sys.executable, "-m", "hbvm_bench.run.worker", str(path), str(os.getpid())]
-        fresh = supervise.Subprocess(command, {**ENVIRONMENT, **(environment or {})})
-        ended = supervise.watch(fresh, request.limits, compiled)
+    compiles = request.computation is None
+    ended = process.ask(msgspec.json.encode(request), request.limits, compiles=compiles)
     if ended.cause == "stopped":
         raise InterruptedRunError
-    return ended
+    answer = msgspec.msgpack.decode(ended.reply, type=Answer) if ended.reply else Answer()
+    if answer.refusal:
+        raise UnfinishedRunError(f"{platform.node()} {answer.refusal}")
+    return ended, answer
 
 
-def decoded(path: Path, type_: type[T]) -> T | None:
-    """Return what a worker wrote, or ``None`` if it is missing or something else."""
-    try:
-        return records.decoded(path.read_bytes(), type_)
-    except (FileNotFoundError, ValueError):  # msgspec's errors and bad UTF-8 are among the latter
-        return None
+def stay_on(core: int) -> None:
+    """Let the cases that this thread starts stay on one core."""
+    _here.core = core
 
 
-def _difference(versions: dict[str, str], resolved: Resolved) -> str:
-    here = versions_of(resolved.method)
-    differing = [
-        f"{name} {here.get(name, 'not known')} instead of {version}"
-        for name, version in versions.items()
-        if here.get(name) != version
-    ]
-    difference = ", ".join(differing) or "other sources of hbvm-bench"
-    return f"{platform.node()} would run another case than was asked for: it has {difference}"
+class _Here(threading.local):
+    """What this thread has: a core, and the process that it asked last, which ends with the thread."""
+
+    core: int | None = None
+    place: object = None
+    process: Child | None = None
+
+    def child(self, request: Request) -> Child:
+        """Return the process for a request: the last one, unless that served another library or place."""
+        loads = request.rows[0].library if request.computation is None else request.computation.folder
+        place = loads, dict(os.environ), Path.cwd()
+        fresh = request.computation is not None and request.computation.timed
+        if fresh or self.process is None or not self.process.alive or self.place != place:
+            if self.process is not None:
+                self.process.close()
+            self.process, self.place = Child(), place
+        return self.process
 
 
-def _result(scratch: Path, ended: Ended, limits: Limits) -> tuple[Result, bytes]:
+_here = _Here()
+
+
+def _result(ended: Ended, answer: Answer, limits: Limits) -> tuple[Result, bytes]:
     def failed(outcome: Outcome, reason: str, status: str = "") -> tuple[Result, bytes]:
         return Result(outcome=outcome, reason=reason, status=status), b""
 
@@ -244,18 +234,33 @@ def _result(scratch: Path, ended: Ended, limits: Limits) -> tuple[Result, bytes]
         return failed("timeout", reason, COMPILING)
     if ended.cause == "memory":
         return failed("killed", f"used more than {limits.memory_gib:g} GiB of memory")
-    if ended.code == ending.KILLED:
+    if ended.code == child.KILLED:
         return failed("killed", "ended by signal SIGKILL from outside, perhaps for want of memory", DIED)
     if ended.code != 0:
         return failed("crashed", f"the process {ended.words}", DIED)
-    result = decoded(scratch / REPLY, Result)
-    if result is None:
-        return failed("crashed", NO_RESULT, DIED)
-    if result.outcome not in ("ok", "stalled"):
-        return result, b""
     try:
-        series = (scratch / "arrays").read_bytes()
-        arrays.decode(series)
-    except (FileNotFoundError, ValueError):
-        return failed("crashed", NO_RESULT, DIED)
-    return result, series
+        result = records.decoded(answer.result, Result)
+        if answer.series:
+            arrays.decode(answer.series)
+    except ValueError:  # msgspec's errors and bad UTF-8 are among these
+        return NO_RESULT, b""
+    return result, answer.series
+
+
+def timed(request: Request) -> list[Timing]:
+    """Return the times of the cases of a request, which one new process takes in turn, or why it has none.
+
+    Where the rounds are shared among several compilations, it compiles anew.
+
+    Raises what `asked` does.
+    """
+    assert request.plan is not None
+    with tempfile.TemporaryDirectory(prefix="hbvm-bench-") as scratch:
+        process = Child(child.empty_caches(Path(scratch)) if request.plan.compilations > 1 else {})
+        try:
+            ended, answer = asked(process, request)
+        finally:
+            process.close()
+    if answer.timings:
+        return records.decoded(answer.timings, list[Timing])
+    return [Timing(why=f"not timed: {ENDINGS.get(ended.cause, ended.words)}")] * len(request.rows)

@@ -1,148 +1,127 @@
-"""The process that runs one case: ``python -m hbvm_bench.run.worker REQUEST.json PARENT``, or a warm one.
+"""The process that runs cases, ``python -m hbvm_bench.run.worker``: it reads requests and writes answers.
 
-It writes ``reply.json``, a `Result` (with ``arrays``) or a list of `Timing`, beside the
-request and leaves the store alone; whatever happens to it, the runner that
-started it says what.
+See `hbvm_bench.run.task` for both. It leaves the store alone; whatever happens to it, the runner that started
+it says what. It serves cases of one library, so that what a case finds loaded is what it would load.
 """
 
+import contextlib
 import errno
+import gc
 import os
 import sys
+import tempfile
+import threading
 import traceback
 import warnings
+from collections.abc import Callable
 from pathlib import Path
-from typing import Literal
+from queue import SimpleQueue
+from typing import IO
 
 import msgspec
 import numpy as np
+import psutil
 
-from hbvm_bench.campaign import folder, own
-from hbvm_bench.campaign.file import Case, Limits, TimingPlan
-from hbvm_bench.campaign.identity import Resolved, fixed_step, resolve
+from hbvm_bench.campaign import own
+from hbvm_bench.campaign.identity import Resolved, fixed_step, resolve, versions_of
 from hbvm_bench.measure import batch, ensemble, machine, memory, raw, timing
-from hbvm_bench.measure.computation import VALUE, Task, packed
+from hbvm_bench.measure.computation import VALUE, packed
 from hbvm_bench.measure.raw import Series
 from hbvm_bench.measure.timing import SingleRun, Timeable
-from hbvm_bench.run import ending
+from hbvm_bench.reference import solutions
+from hbvm_bench.run import child
+from hbvm_bench.run.task import Answer, Computation, Request
 from hbvm_bench.store.arrays import NAME, encode
-from hbvm_bench.store.files import atomic
-from hbvm_bench.store.records import Result, Timing
+from hbvm_bench.store.records import Record, Result
 from integrators.protocol import PreparedBatches, Program, Status, offers
 from integrators.solution import Solution
 from problems.errors import InputError
 
-REPLY = "reply.json"
-COMPILED = "compiled"  # the file that says that compiling has ended
-NO_ROOM = 73  # the exit code for a full disk, which is no fault of the case
 DISK = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
-STALE = "the sources or versions changed while the run was under way; start it again."
-Found = Literal["nothing", "libraries", "code"]
-ENVIRONMENT = {
-    # one thread each, whatever does the linear algebra
-    "OMP_NUM_THREADS": "1",
-    "OPENBLAS_NUM_THREADS": "1",
-    "MKL_NUM_THREADS": "1",
-    "NUMBA_NUM_THREADS": "1",
-    "XLA_FLAGS": "--xla_cpu_multi_thread_eigen=false",
-    "JAX_PLATFORMS": "cpu",
-}
+GROWTH = 2**16  # KiB that a process may have grown by since its first case and still serve another one
+
+Measured = tuple[Result, Series]
 
 
-class Computation(msgspec.Struct, frozen=True, kw_only=True):
-    """One computation of a study.
-
-    Attributes
-    ----------
-    folder, place : str
-        Of the function that lists them, as in ``./blocks.py:tasks``.
-    key : str
-        Which of them.
-    quick : bool
-        Whether the run is quick.
-    timed : bool
-        Whether it takes times: it finds nothing loaded then, and nothing runs beside it.
-    limit : float
-        Seconds after which it is ended.
-    """
-
-    folder: str
-    place: str
-    key: str
-    quick: bool
-    timed: bool = False
-    limit: float = 3600.0
-
-    def tasks(self) -> dict[str, Task]:
-        """Return the tasks of the study, by their keys."""
-        return {task.key: task for task in folder.named(self.place, Path(self.folder))(self.quick)}
-
-
-class Request(msgspec.Struct, frozen=True, kw_only=True):
-    """What travels to a worker, and before that to whichever machine shall start it.
-
-    Attributes
-    ----------
-    cases : dict of Case
-        By the ids that the runner gave them, which must come out the same elsewhere; several are
-        timed together.
-    limits : Limits
-        Wall time and memory of the process.
-    plan : TimingPlan or None
-        What to time; ``None`` for the accuracy run.
-    versions : dict
-        Behind the ids, to name what differs elsewhere.
-    beside : own.Beside
-        What must be known of their problem.
-    rounds : list of int
-        Of interleaved times, those that are this process's.
-    compilation : int
-        Which of the plan's compilations they are of.
-    core : int or None
-        The core to stay on.
-    computation : Computation or None
-        What to do instead of an integration.
-    """
-
-    cases: dict[str, Case]
-    limits: Limits
-    plan: TimingPlan | None = None
-    versions: dict[str, str] = {}
-    beside: own.Beside = own.Beside()
-    rounds: list[int] = []
-    compilation: int = 0
-    core: int | None = None
-    computation: Computation | None = None
-
-
-def work(path: Path, parent: int, warmth: Found = "nothing") -> None:
-    """Do what the request at a path asks, as the only thing that this process does.
-
-    It ends with ``parent``, which has made it. What it has ``found`` loaded, as a fork of it, is not counted.
-    """
-    request = msgspec.json.decode(path.read_bytes(), type=Request)
-    own.add_known(request.beside)
-    ending.limit_and_die_with(parent)
-    if request.core is not None:
-        machine.bind([request.core])
+def main() -> None:
+    """Answer the requests at the input until it ends, as it does with the parent."""
+    child.limit()
+    answers, requests = os.fdopen(os.dup(1), "wb"), os.fdopen(os.dup(0), "rb")
+    os.dup2(2, 1)  # what is printed is no answer
+    waiting: SimpleQueue[bytes] = SimpleQueue()
+    threading.Thread(target=_listen, args=(requests, waiting), daemon=True).start()
     # complex states are no states, and their real parts are not either
     warnings.simplefilter("error", np.exceptions.ComplexWarning)
-    try:
-        if request.computation is not None:
-            (path.parent / COMPILED).touch()
-            reply: object = _computed(request.computation, path.parent)
-        elif request.plan is None:
-            reply = _measured(request, path.parent, parent, warmth)
-        else:
-            reply = _time(request, request.plan, path.parent)
-        with atomic(path.parent / REPLY) as temporary:
-            temporary.write_bytes(msgspec.json.encode(reply))
-    except (OSError, InputError) as error:
-        if getattr(error.__cause__ or error, "errno", None) in DISK:
-            sys.exit(NO_ROOM)
-        raise
+    done: set[tuple[str, str]] = set()
+    size = 0
+    while True:
+        request = msgspec.json.decode(waiting.get(), type=Request)
+        try:
+            answer = _answered(request, lambda: child.send(answers, child.COMPILED), done)
+        except (OSError, InputError) as error:
+            if getattr(error.__cause__ or error, "errno", None) not in DISK:
+                raise
+            room = f"make some in {tempfile.gettempdir()} and in the cache, and run the same command again"
+            answer = Answer(refusal=f"has no room for the results of a case; {room}")
+        gc.collect()
+        memory.forget_peak()
+        held = memory.own_peak()
+        size = size or held
+        stays = held - size < GROWTH and not psutil.Process().children()
+        sys.stdout.flush()
+        sys.stderr.flush()
+        child.send(answers, (child.STAYS if stays else child.LEAVES) + msgspec.msgpack.encode(answer))
 
 
-def _computed(asked: Computation, directory: Path) -> Result:
+def _listen(requests: IO[bytes], waiting: "SimpleQueue[bytes]") -> None:
+    child.take(requests, waiting)
+    os._exit(0)
+
+
+def _answered(request: Request, compiled: Callable[[], None], done: set[tuple[str, str]]) -> Answer:
+    """Do what a request asks; ``done`` are the libraries and problems whose code is loaded."""
+    solutions.forget()
+    own.add_known(request.beside)
+    if request.core is not None:
+        machine.bind([request.core])
+    if request.computation is not None:
+        return _stored(*_computed(request.computation))
+    cases = [resolve(row.case) for row in request.rows]
+    for row, here in zip(request.rows, cases, strict=True):
+        if row.id != here.id:
+            return Answer(refusal=_difference(row, here))
+    if request.plan is not None:
+        runs = [_run(case) for case in cases]
+        compiled()
+        timings = timing.time_together(runs, request.plan, request.rounds, request.compilation)
+        return Answer(timings=msgspec.json.encode(timings))
+    (case,) = cases
+    result, series = _measure(case, compiled)
+    loads = case.method.library, case.problem.name or ""
+    if loads in done:  # the seconds to compile say nothing
+        result = msgspec.structs.replace(result, compile=None)
+    done.add(loads)
+    if result.outcome in ("ok", "stalled"):
+        result = msgspec.structs.replace(result, peak_gib=memory.own_peak() / 2**20)
+    return _stored(result, series)
+
+
+def _stored(result: Result, series: Series) -> Answer:
+    return Answer(result=msgspec.json.encode(result), series=encode(series) if series else b"")
+
+
+def _difference(row: Record, here: Resolved) -> str:
+    mine = versions_of(here.method)
+    differing = [
+        f"{name} {mine.get(name, 'not known')} instead of {version}"
+        for name, version in row.versions.items()
+        if mine.get(name) != version
+    ]
+    differences = ", ".join(differing) or "other sources of hbvm-bench"
+    return f"would run another case than was asked for: it has {differences}"
+
+
+def _computed(asked: Computation) -> Measured:
     try:
         value = packed(asked.tasks()[asked.key].run())
     except Exception as error:
@@ -150,54 +129,44 @@ def _computed(asked: Computation, directory: Path) -> Result:
         last = traceback.extract_tb(error.__traceback__)[-1]
         where = f"({Path(last.filename).name}, line {last.lineno})"
         reason = f"failed with {type(error).__name__}: {error} {where}"
-        return Result(outcome="crashed", reason=" ".join(reason.split()))
-    return _stored(directory, Result(outcome="ok", status="finished"), {VALUE: value})
+        return Result(outcome="crashed", reason=" ".join(reason.split())), {}
+    return Result(outcome="ok", status="finished"), {VALUE: value}
 
 
-def _measured(request: Request, directory: Path, parent: int, warmth: Found) -> Result:
-    result = _measure(request, directory)
-    if result.outcome not in ("ok", "stalled"):
-        return result
-    compiled = None if warmth == "code" else result.compile  # else the seconds say nothing
-    return msgspec.structs.replace(result, compile=compiled, peak_gib=_peak_gib(parent, warmth))
+def _measure(resolved: Resolved, compiled: Callable[[], None]) -> Measured:
+    def failed(reason: str) -> Measured:
+        traceback.print_exc()
+        return Result(outcome="crashed", reason=reason), {}
 
-
-def _measure(request: Request, directory: Path) -> Result:
     try:
-        (resolved,) = _resolved(request)
         if reason := resolved.method.accepts(resolved.problem):
-            return Result(outcome="refused", reason=reason)
+            return Result(outcome="refused", reason=reason), {}
         names = list(resolved.problem.system.invariants)
         if bad := [name for name in names if not NAME.fullmatch(name)]:
-            return Result(outcome="refused", reason=f"the invariant's name {bad[0]!r} can be no file name")
+            reason = f"the invariant's name {bad[0]!r} can be no file name"
+            return Result(outcome="refused", reason=reason), {}
         grid = resolved.case.grid.times(resolved.problem, fixed_step(resolved.method))
         program = _compiled(resolved)
-        (directory / COMPILED).touch()
+        compiled()
         if (asked := resolved.case.ensemble) is not None:
-            return _stored(directory, *raw.ensemble(resolved.problem, program, asked))
+            return raw.ensemble(resolved.problem, program, asked)
         integrate = raw.solve_with_bare_end if resolved.case.grid.at_steps else raw.solve
         solution = integrate(resolved.problem, resolved.method, program, grid)
-    except OSError as error:
-        if error.errno in DISK:
-            raise
-        traceback.print_exc()
-        return Result(outcome="crashed", reason=f"{type(error).__name__}: {error}")
     except InputError as error:  # a missing library among them
-        return Result(outcome="refused", reason=str(error))
+        return Result(outcome="refused", reason=str(error)), {}
     except Exception as error:
-        traceback.print_exc()
-        return Result(outcome="crashed", reason=f"{type(error).__name__}: {error}")
+        if getattr(error, "errno", None) in DISK:
+            raise
+        return failed(f"{type(error).__name__}: {error}")
     if wrong := _garbage(solution, grid):
-        return Result(outcome="crashed", reason=wrong, status=solution.status.value)
+        return Result(outcome="crashed", reason=wrong, status=solution.status.value), {}
     result, series = raw.of_solution(solution)
     try:
         reversal, more = raw.beside(solution, program, resolved.case.checks)
         reasons, indicators = _chaos(resolved)
     except Exception as error:
-        traceback.print_exc()
-        return Result(outcome="crashed", reason=f"in a check, {type(error).__name__}: {error}")
-    result = msgspec.structs.replace(result, reversal=reversal, chaos=reasons)
-    return _stored(directory, result, series | more | indicators)
+        return failed(f"in a check, {type(error).__name__}: {error}")
+    return msgspec.structs.replace(result, reversal=reversal, chaos=reasons), series | more | indicators
 
 
 def _chaos(resolved: Resolved) -> tuple[dict[str, str], Series]:
@@ -207,29 +176,6 @@ def _chaos(resolved: Resolved) -> tuple[dict[str, str], Series]:
     from hbvm_bench.measure import chaos  # as the numbers of no other case depend on it
 
     return chaos.beside(resolved.problem, resolved.method)
-
-
-def _stored(directory: Path, result: Result, series: Series) -> Result:
-    with atomic(directory / "arrays") as temporary:
-        temporary.write_bytes(encode(series))
-    return result
-
-
-def _peak_gib(parent: int, warmth: Found) -> float:
-    """Return the largest resident memory, with the pages of libraries that a fork has not touched."""
-    untouched = 0
-    if warmth != "nothing":
-        theirs, ours = (memory.of_process(pid).files for pid in (parent, os.getpid()))
-        untouched = theirs - ours
-    return (memory.own_peak() + max(untouched, 0)) / 2**20
-
-
-def _time(request: Request, plan: TimingPlan, directory: Path) -> list[Timing]:
-    runs = [_run(case) for case in _resolved(request)]
-    (directory / COMPILED).touch()
-    if plan.interleaved:
-        return timing.time_together(runs, plan, request.rounds, request.compilation)
-    return [timing.time_alone(run, plan) for run in runs]
 
 
 def _run(resolved: Resolved) -> Timeable:
@@ -246,13 +192,6 @@ def _compiled(resolved: Resolved) -> Program:
     if resolved.case.ensemble is not None and offers(program, PreparedBatches):
         batch.prepared(program, problem.y0[None], problem)
     return program
-
-
-def _resolved(request: Request) -> list[Resolved]:
-    cases = [resolve(case) for case in request.cases.values()]
-    if [resolved.id for resolved in cases] != list(request.cases):
-        raise InputError(STALE)
-    return cases
 
 
 def _garbage(solution: Solution, grid: np.ndarray) -> str:
@@ -273,4 +212,5 @@ def _garbage(solution: Solution, grid: np.ndarray) -> str:
 
 
 if __name__ == "__main__":
-    work(Path(sys.argv[1]), int(sys.argv[2]))
+    with contextlib.suppress(BrokenPipeError):  # the runner has gone
+        main()

@@ -15,8 +15,7 @@ import problems
 from hbvm_bench.campaign.identity import make_method
 from hbvm_bench.measure import machine
 from hbvm_bench.measure.timing import busy, interleaved, load_between, no_collection
-from hbvm_bench.run.task import empty_caches
-from hbvm_bench.run.worker import ENVIRONMENT
+from hbvm_bench.run.child import ENVIRONMENT, empty_caches
 from hbvm_bench.store.records import Load
 from integrators import integrate, start
 from integrators.protocol import Status

@@ -149,9 +149,6 @@ RIGHT\n[timing]\nrounds = -1                                 => Expected `int` >
 RIGHT\n[timing]\nrounds = 1.5                                => Expected `int`, got `float`, at
 RIGHT\n[timing]\nrounds = "a"                                => Expected `int`, got `str`, at `timing.rounds`
 RIGHT\n[timing]\nrounds = 1000000000000                      => Expected `int` <= 10000, at `timing.rounds`
-RIGHT\n[timing]\nsamples = 0                                 => Expected `int` >= 1, at `timing.samples`
-RIGHT\n[timing]\nsamples = "a"                               => Expected `int`, got `str`, at
-RIGHT\n[timing]\nsamples = 1000000000000                     => Expected `int` <= 10000, at `timing.samples`
 RIGHT\n[timing]\nshortest = 0                                => Expected `float` > 0.0, at `timing.shortest`
 RIGHT\n[timing]\nshortest = nan                              => Expected `float` > 0.0, at `timing.shortest`
 RIGHT\n[timing]\nshortest = inf                              => Expected `float` <= 1e+300, at
@@ -177,9 +174,6 @@ RIGHT\n[grid]\nstep = 1e99                                    => step=1e+99 of t
 RIGHT\n[grid]\nmultiple_of = 1e99                             => multiple_of=1e+99 of the grid of kepler lies
 PROBLEMS\nproblems = [{use = "kepler()", grid = {also = [1e9]}}] => also=1000000000.0 of the grid of kepler li
 RIGHT\n[timing]\nshortest = 1e-4                              => shortest=0.0001 of timing is too short for a
-RIGHT\n[timing]\nclock = "thread"                             => clock='thread' of timing belongs to interleav
-RIGHT\n[timing]\norder = "alternating"                        => order='alternating' of timing belongs to
-RIGHT\n[timing]\ninterleaved = true\nsamples = 5              => samples=5 of timing belongs to interleaved
 RIGHT\n[page]\nseries = ["drift.enrgy"]                      => unknown series of the campaign's cases
 RIGHT\n[page]\nseries = ["error.energy", "guard.x"]          => unknown series of the campaign's cases
 METHODS\nmethods = [{use = []}]                               => a method with use = [] has no settings; give

@@ -7,8 +7,7 @@ import pytest
 import integrators.registry
 from hbvm_bench.campaign.identity import resolve
 from hbvm_bench.measure import reading
-from hbvm_bench.run.task import execute, task_of
-from hbvm_bench.store.records import Record, decoded
+from hbvm_bench.run.task import execute, request_of
 from hbvm_bench.store.store import Store
 from problems.errors import InputError
 
@@ -60,8 +59,7 @@ def toys(toy_path, monkeypatch):
 
 def run_case(case, directory, limits):
     """Integrate one case in a process of its own, store it, and return it with its reading."""
-    record, series = execute(task_of(resolve(case), limits))
-    made = decoded(record, Record)
+    made, series = execute(request_of(resolve(case), limits))
     store = Store(Path(directory))
     store.save(made, series or None)
     return reading.up_to_date(store, made)

@@ -214,13 +214,6 @@ class Hungry(ToyBase):
             time.sleep(0.01)
 
 
-def _write_and_leave(result, series=b""):
-    folder = Path(sys.argv[1]).parent  # of the request
-    (folder / "reply.json").write_bytes(result)
-    (folder / "series.npz").write_bytes(series)
-    os._exit(0)
-
-
 @dataclass(frozen=True, kw_only=True)
 class Garbage(ToyBase):
     """Breaks the protocol, or writes nonsense."""
@@ -242,10 +235,6 @@ class Garbage(ToyBase):
             case "noise":
                 sys.stdout.buffer.write(os.urandom(1 << 20))
                 sys.stdout.flush()
-            case "result":
-                _write_and_leave(result=os.urandom(1000))
-            case "series":
-                _write_and_leave(result=b'{"outcome": "ok"}', series=os.urandom(1000))
         return super().samples(times, states)
 
 

@@ -17,8 +17,7 @@ from pathlib import Path
 import msgspec
 
 from hbvm_bench.campaign.file import Case
-from hbvm_bench.run.task import empty_caches
-from hbvm_bench.run.worker import ENVIRONMENT
+from hbvm_bench.run.child import ENVIRONMENT, empty_caches
 from hbvm_bench.store.records import Record, Result
 from hbvm_bench.studies.race.families import OURS
 

@@ -11,7 +11,7 @@ from hbvm_bench.measure.measured import measure, with_growth
 from hbvm_bench.measure.metrics import evaluate
 from hbvm_bench.measure.raw import solve
 from hbvm_bench.measure.starts import PERTURBATION, members, scaled
-from hbvm_bench.measure.timing import time_alone
+from hbvm_bench.measure.timing import time_together
 from hbvm_bench.reference.solutions import find
 from integrators import Gauss, Leapfrog
 from problems.errors import InputError
@@ -103,7 +103,7 @@ def test_an_ensemble_is_measured_against_the_ends_of_its_reference_subset():
     assert metrics["energy_max"].value < 1e-14  # 3.4e-16 measured
     assert metrics["throughput"].why == "not timed"
     run = EnsembleRun.compiled(problem, Gauss(s=8, h=0.5), program, asked)
-    timed = time_alone(run, TimingPlan(samples=2, budget=1))
+    (timed,) = time_together([run], TimingPlan(rounds=2, budget=1), [0, 1])
     assert len(timed.samples) == 2
     # a method without a batch path takes one after the other, to the same end
     other, _ = of_ensemble(problem, Leapfrog(h=0.01, order=8).compile(problem.system), asked)

@@ -9,10 +9,11 @@ import pytest
 
 import integrators
 import problems
-from hbvm_bench.campaign.file import Ensemble, TimingPlan
+from hbvm_bench.campaign.file import Case, Ensemble, Limits, TimingPlan
 from hbvm_bench.campaign.identity import make_method
 from hbvm_bench.measure import ensemble, timing
-from hbvm_bench.run import worker
+from hbvm_bench.run import task, worker
+from hbvm_bench.store.records import Record
 from integrators.protocol import MethodBase, Samples, Stats, Status
 from problems.errors import InputError
 
@@ -101,22 +102,27 @@ def test_a_batch_is_prepared_before_it_runs(method):
         program.prepare_batch(np.empty((0, 4)), times=[1.0])
 
 
-def test_a_case_s_clock_begins_when_all_is_compiled(tmp_path, monkeypatch):
+def test_a_case_s_clock_begins_when_all_is_compiled(monkeypatch):
+    said = []
+
     class Late(Batching):
         def prepare_batch(self, Y0, par=None, *, times, t0=0.0):
-            assert not (tmp_path / worker.COMPILED).exists()
+            assert not said
             return super().prepare_batch(Y0, par, times=times, t0=t0)
 
     class Method(Landing):
         def compile(self, system):
             return Late()
 
-    case = SimpleNamespace(ensemble=Ensemble(count=3, spread=0.1))
-    resolved = SimpleNamespace(case=case, method=Method(), problem=problems.load("pendulum", t_end=1.0))
-    monkeypatch.setattr(worker, "_resolved", lambda request: [resolved])
-    monkeypatch.setattr(timing, "time_alone", lambda run, plan: [run.program.now])
-    assert worker._time(None, TimingPlan(), tmp_path) == [[1000.0]]
-    assert (tmp_path / worker.COMPILED).exists()
+    asked = Case(problem="pendulum()", method="", ensemble=Ensemble(count=3, spread=0.1))
+    problem = problems.load("pendulum", t_end=1.0)
+    resolved = SimpleNamespace(case=asked, id="1", method=Method(), problem=problem)
+    monkeypatch.setattr(worker, "resolve", lambda case: resolved)
+    monkeypatch.setattr(timing, "time_together", lambda runs, *_: [runs[0].program.now])
+    row = Record(id="1", case=asked, role="ours", library="", order=1, result=task.NO_RESULT)
+    request = task.Request(rows=[row], limits=Limits(), plan=TimingPlan())
+    assert worker._answered(request, lambda: said.append(True), set()).timings == b"[1000.0]"
+    assert said
 
 
 @pytest.mark.parametrize(("asked", "order"), [("alternating", "abbaab"), ("as given", "ababab")])
@@ -194,7 +200,7 @@ def test_shuffled_rounds_are_in_another_order_each_and_the_same_every_time():
 def test_the_calibration_of_thread_times_is_by_the_same_clock(monkeypatch):
     asked = []
     monkeypatch.setattr(timing, "calibrate", lambda clock: asked.append(clock) or 0.01)
-    plan = TimingPlan(rounds=2, interleaved=True, clock="thread", shortest=1e-6)
+    plan = TimingPlan(rounds=2, clock="thread", shortest=1e-6)
     timing.time_together(
         [timing.SingleRun.compiled(problems.load("pendulum", t_end=1.0), Landing())], plan, [0, 1]
     )

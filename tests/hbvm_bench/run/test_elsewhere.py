@@ -11,7 +11,8 @@ import pytest
 
 from hbvm_bench.campaign.file import Case, Grid, Limits
 from hbvm_bench.measure import doctor, machine, memory, timing
-from hbvm_bench.run import ending, supervise, warm
+from hbvm_bench.run import child, task
+from hbvm_bench.run.child import Child
 from hbvm_bench.store.store import Store
 from tests.elsewhere import elsewhere
 from tests.hbvm_bench.conftest import SHORT, run_case
@@ -20,12 +21,13 @@ from tests.hbvm_bench.conftest import SHORT, run_case
 @pytest.fixture
 def hidden(monkeypatch):
     """Hide the calls of Linux from this process, which starts the others and watches them."""
-    for name in ("fork", "pidfd_open", "killpg", "getsid", "sched_getaffinity", "sched_setaffinity"):
+    for name in ("fork", "killpg", "getsid", "sched_getaffinity", "sched_setaffinity"):
         monkeypatch.delattr(os, name)
     monkeypatch.setattr(machine, "BINDS", False)
     monkeypatch.setattr(memory, "PROCESSES", Path("nowhere"))
     monkeypatch.setattr(memory, "resource", None)
-    monkeypatch.setattr(ending, "resource", None)
+    monkeypatch.setattr(child, "resource", None)
+    task._here.process = None
 
 
 def all_end(processes):
@@ -58,39 +60,38 @@ def test_a_case_has_a_process_that_begins_with_nothing_and_its_limits_hold(tmp_p
     assert (
         0.02 < record.peak_memory_gib < 1.2
     )  # measured 0.04; it eats 30 MiB every 10 ms and is looked at every 20 ms
-    assert not warm.possible()
 
 
 @pytest.mark.usefixtures("hidden")
 def test_memory_of_descendants_counts_and_they_are_killed():
     eat = "x = bytearray(300 << 20); import time; time.sleep(20)"
     start = f"import subprocess, sys; subprocess.run([sys.executable, '-c', {eat!r}])"
-    child = supervise.Subprocess([sys.executable, "-c", start], {})
-    while not (descendants := psutil.Process(child.pid).children()):
+    process = Child(command=["-c", start])
+    while not (descendants := psutil.Process(process.process.pid).children()):
         time.sleep(0.02)
-    ended = supervise.watch(child, Limits(wall_seconds=15, memory_gib=0.2))
+    ended = process.ask(b"", Limits(wall_seconds=15, memory_gib=0.2))
     assert ended.cause == "memory"
     assert 0.2 < ended.peak_gib < 0.6  # measured 0.31
     assert all_end(descendants)
 
 
 def test_a_worker_ends_with_its_parent_where_the_system_does_not_see_to_it():
+    """By the end of its input, as the parent's are closed."""
     worker = (
-        "import os, time; from hbvm_bench.run import ending;"
-        "ending._prctl, ending.LOOK = lambda: None, 0.1; ending.limit_and_die_with(os.getppid());"
-        "print(os.getpid(), flush=True); time.sleep(60)"
+        "import time; from hbvm_bench.run import child, worker; child.limit = lambda: None;"
+        "worker._answered = lambda *_: time.sleep(60); worker.main()"
     )
-    parent = subprocess.Popen(
-        [sys.executable, "-c", f"import subprocess, sys; subprocess.run([sys.executable, '-c', {worker!r}])"],
-        stdout=subprocess.PIPE,
-        text=True,
+    parent = (
+        "import sys; from hbvm_bench.run.child import Child; from hbvm_bench.campaign.file import Limits;"
+        f"asked = Child(command=['-c', {worker!r}]); print(asked.process.pid, flush=True);"
+        """asked.ask(b'{"rows": [], "limits": {}}', Limits())"""
     )
-    with parent, parent.stdout:
-        process = psutil.Process(int(parent.stdout.readline()))
-        time.sleep(0.5)  # five looks
-        assert process.is_running()
-        parent.kill()
-        assert all_end([process])
+    with subprocess.Popen([sys.executable, "-c", parent], stdout=subprocess.PIPE, text=True) as process:
+        child_ = psutil.Process(int(process.stdout.readline()))
+        time.sleep(1.0)
+        assert child_.is_running()
+        process.kill()
+        assert all_end([child_])
 
 
 def test_psutil_tells_the_memory_that_the_system_tells(monkeypatch):

@@ -17,7 +17,7 @@ from hbvm_bench.campaign.file import Case, Grid, Limits
 from hbvm_bench.campaign.identity import resolve
 from hbvm_bench.measure import reading
 from hbvm_bench.run import executors, loop
-from hbvm_bench.run.task import UnfinishedRunError, execute, task_of
+from hbvm_bench.run.task import UnfinishedRunError, execute, request_of
 from hbvm_bench.store.store import Store
 from problems.errors import InputError
 from tests.hbvm_bench.conftest import SHORT, stored
@@ -61,7 +61,7 @@ def assert_equal(one, other):
 
 def run_on(name, chosen, store, jobs=None, limits=LIMITS):
     with executors.opened(name, jobs) as pool:
-        return list(loop.run_accuracy(chosen, store, limits, pool))
+        return list(loop.run_accuracy([request_of(one, limits) for one in chosen], store, pool))
 
 
 @pytest.mark.slow
@@ -71,7 +71,7 @@ def test_a_cluster_that_loses_a_worker_in_the_middle_gives_what_this_machine_giv
     run_on("local", chosen, here, jobs=2)
     with Cluster(tmp_path, 3) as cluster, executors.opened(f"dask://{cluster.address}") as pool:
         cluster.wait_for(lambda: pool.slots() == 3, "workers")
-        records = loop.run_accuracy(chosen, there, LIMITS, pool)
+        records = loop.run_accuracy([request_of(one, LIMITS) for one in chosen], there, pool)
         next(records)
         cluster.kill(cluster.workers[0])
         assert len(list(records)) == len(chosen) - 1
@@ -85,7 +85,7 @@ def test_a_scheduler_that_is_killed_costs_no_finished_case(toys, tmp_path):
     chosen = cases(4, wait=0.5)
     store = store_in(tmp_path / "run")
     with Cluster(tmp_path, 1) as cluster, executors.opened(f"dask://{cluster.address}") as pool:
-        records = loop.run_accuracy(chosen, store, LIMITS, pool)
+        records = loop.run_accuracy([request_of(one, LIMITS) for one in chosen], store, pool)
         first = next(records)
         cluster.kill(cluster.scheduler)
         with pytest.raises(UnfinishedRunError, match=r"scheduler at .* is gone"):
@@ -127,7 +127,6 @@ problems = ["{problem}"]
 methods = [{{ use = "Waving(h={{h}}, wait=0.05)", sweep = {{ h = [0.1, 0.2] }} }}]
 [timing]
 rounds = 2
-samples = 1
 """
 
 
@@ -199,14 +198,13 @@ def test_without_distributed_the_extra_is_named(monkeypatch):
 
 
 def test_a_machine_that_would_run_another_case_says_what_differs(toys):
-    asked = msgspec.json.decode(task_of(cases(1)[0], LIMITS))
-    (case,) = asked["cases"].values()
-    asked["cases"] = {"0" * 64: case}
+    asked = request_of(cases(1)[0], LIMITS)
+    row = msgspec.structs.replace(asked.rows[0], id="0" * 64)
     with pytest.raises(UnfinishedRunError, match="other sources"):
-        execute(msgspec.json.encode(asked))
-    asked["versions"]["toys"] = "0.9"
+        execute(msgspec.structs.replace(asked, rows=[row]))
+    row = msgspec.structs.replace(row, versions=row.versions | {"toys": "0.9"})
     with pytest.raises(UnfinishedRunError, match=r"it has toys 1\.0 instead of 0\.9$"):
-        execute(msgspec.json.encode(asked))
+        execute(msgspec.structs.replace(asked, rows=[row]))
 
 
 def test_a_machine_that_would_run_another_case_ends_the_run(toys, tmp_path):
@@ -223,7 +221,7 @@ class Losing(ThreadPoolExecutor):
     lost = 0
 
     def submit(self, fn, task):
-        if b"h=0.2" not in task:
+        if "h=0.2" not in task.case.method:
             return super().submit(fn, task)
         self.lost += 1
         future = Future()
@@ -235,7 +233,9 @@ def test_a_case_that_an_executor_loses_is_tried_three_times_and_named_after_all_
     chosen = cases(2)
     store = store_in(tmp_path / "run")
     with Losing(1) as executor:
-        records = loop.run_accuracy(chosen, store, LIMITS, executors.pool_of(executor))
+        records = loop.run_accuracy(
+            [request_of(one, LIMITS) for one in chosen], store, executors.pool_of(executor)
+        )
         assert next(records).id == chosen[0].id
         with pytest.raises(UnfinishedRunError, match="1 case could not be run: OSError: the machine"):
             next(records)
