@@ -767,6 +767,10 @@ class MethodBase(CheckedOptions):
     to_end : str or None
         The sampling with which the library's documentation integrates to an end time, which is timed;
         ``None`` if it is the default of `Stepper.advance`.
+    built : str
+        What the library's machine code is built for, in a few words.
+    computes_with : tuple of str
+        Packages on whose versions the numbers depend, beside the library itself.
 
     Raises
     ------
@@ -787,6 +791,8 @@ class MethodBase(CheckedOptions):
     citation: ClassVar[str] = ""
     family: ClassVar[str] = ""
     to_end: ClassVar[str | None] = None
+    built: ClassVar[str] = ""
+    computes_with: ClassVar[tuple[str, ...]] = ()
 
     order = cast("int | None", None)  # without an annotation, with which it would be an option
     """Order of convergence, an int; ``None`` where it varies with the tolerance."""

@@ -61,6 +61,12 @@ def get(name: str) -> type[MethodBase]:
     return entry.load()
 
 
+def libraries() -> dict[str, type[MethodBase]]:
+    """Return the libraries whose methods come with this package, each with one of these."""
+    methods = (get(own[0]) for own in BUILT_IN.values())
+    return {method.library: method for method in methods}
+
+
 def create(name: str, **options: Any) -> MethodBase:
     """Make the method ``name`` with the given options.
 

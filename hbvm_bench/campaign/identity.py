@@ -35,15 +35,6 @@ JUDGING = ("drift.py", "measured.py", "metrics.py", "reading.py")
 """But for these: what they compute from the arrays of a case, they compute whenever it is read."""
 KERNEL = "integrators.kernel"
 TOLERANCES = ("tol", "rtol", "epsilon")  # a method that has one takes h for its first step alone
-# A library's numbers also depend on what it computes with.
-COMPUTES_WITH = {
-    "hbvm-bench": ("numpy", "numba", "llvmlite"),
-    "diffrax": ("diffrax", "jax", "jaxlib", "equinox", "lineax", "optimistix"),
-    "scipy": ("scipy", "numpy", "numba"),
-    "scikit-sundae": ("scikit-sundae", "numpy", "numba"),
-    "pyhamsys": ("pyhamsys", "numpy", "numba"),
-    "pynamicalsys": ("pynamicalsys", "numpy", "numba"),
-}
 
 
 @dataclass(frozen=True)
@@ -155,7 +146,7 @@ def case_key(case: Case, problem: Problem, method: MethodBase) -> dict[str, Any]
         }
         | {
             # a case without them keeps the id it had
-            name: msgspec.to_builtins(asked)
+            name: msgspec.structs.asdict(asked)  # with defaults, which msgspec tells by the object
             for name, asked in (("checks", case.checks), ("ensemble", case.ensemble))
             if asked not in (None, Checks())
         }
@@ -165,7 +156,7 @@ def case_key(case: Case, problem: Problem, method: MethodBase) -> dict[str, Any]
 
 def versions_of(method: MethodBase) -> dict[str, str]:
     """Return the versions of Python and of the libraries that a method's numbers depend on."""
-    names = COMPUTES_WITH.get(method.library.lower(), (method.library,))
+    names = (method.library, *method.computes_with)
     return {"python": platform.python_version()} | {name: version_of(name) for name in names}
 
 

@@ -1,11 +1,12 @@
 """What is missing on this machine, and whether timings here can be trusted."""
 
 import os
+import re
 import shutil
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import PackageNotFoundError, requires, version
 from importlib.util import find_spec
 from pathlib import Path
 from statistics import median, quantiles
@@ -30,15 +31,12 @@ LEAST_SHARE = 0.97  # of a core while calibrating
 LARGEST_STEAL = 0.01  # of the wall time of all cores
 LOOKS, PAUSE = 9, 0.03  # at the processes that run: something short always does
 
-# Of each optional extra its libraries, and what happens without them.
-EXTRAS = {
-    "peers": (
-        ("heyoka", "rebound", "diffrax", "pyhamsys", "scikit-sundae"),
-        "their methods are refused, and only HBVM and Gauss run",
-    ),
-    "dask": (("distributed",), "--executor dask:// does not work"),
-    "export": (("pyarrow",), "export writes CSV only"),
+WITHOUT = {
+    "peers": "their methods are refused, and only HBVM and Gauss run",
+    "dask": "--executor dask:// does not work",
+    "export": "export writes CSV only",
 }
+"""What happens without the libraries of an optional extra."""
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 
 
@@ -75,10 +73,10 @@ def python() -> Finding:
 def libraries() -> list[Finding]:
     """Return for every optional library its version, or what does not work without it."""
     findings: list[Finding] = []
-    for extra, (names, without) in EXTRAS.items():
+    for extra, without in WITHOUT.items():
         state: State = "bad" if extra == "peers" else "note"
         missing = f"not installed: {without}", f"pip install 'hbvm-bench[{extra}]'"
-        for name in names:
+        for name in of_extra(extra):
             try:
                 findings.append(Finding(name, "ok", version(name)))
             except PackageNotFoundError:
@@ -95,10 +93,17 @@ def libraries() -> list[Finding]:
     return findings
 
 
+def of_extra(extra: str) -> list[str]:
+    """Return the libraries that an optional extra of this package installs."""
+    marker = re.compile(rf"extra == [\"']{extra}[\"']")
+    needed = (text for text in requires("hbvm-bench") or () if marker.search(text))
+    return [re.split(r"[^\w.-]", text)[0] for text in needed]
+
+
 def methods() -> list[Finding]:
     """Return the registered methods of libraries that are no extra of ours, and those that fail to load."""
     findings: list[Finding] = []
-    known = {"hbvm-bench", "scipy", *APART}.union(*(names for names, _ in EXTRAS.values()))
+    known = integrators.registry.libraries()
     for name in integrators.registry.names():
         try:
             library = integrators.registry.get(name).library

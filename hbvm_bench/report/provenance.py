@@ -8,20 +8,9 @@ from hbvm_bench.report.document import Commands, Section
 from hbvm_bench.store.records import Load, Record
 from hbvm_bench.summaries import outcomes
 from hbvm_bench.summaries.table import Table
+from integrators.registry import libraries
 
 DIGITS = 12  # of a digest
-
-# Machine code of the libraries: what the times were made with.
-BUILT = {
-    "hbvm-bench": "compiled on this machine by numba",
-    "heyoka": "compiled on this machine by LLVM",
-    "diffrax": "compiled on this machine by XLA",
-    "rebound": "generic wheel",
-    "scipy": "generic wheel; vector field compiled on this machine by numba",
-    "scikit-sundae": "generic wheel; vector field and Jacobian compiled on this machine by numba",
-    "pynamicalsys": "compiled on this machine by numba",
-    "pyhamsys": "a loop in Python; maps compiled on this machine by numba",
-}
 
 
 def days(records: Sequence[Record]) -> str:
@@ -39,9 +28,10 @@ def measured_on(day: str, kernel: str, loads: Sequence[Load]) -> str:
 def versions(records: Sequence[Record]) -> dict[str, str]:
     """Return the versions of the libraries, and how their machine code came about."""
     numbers_of = _each_once([record.versions for record in records], ", ")
-    built = {name: BUILT.get(name.lower()) for name in numbers_of}
+    built = {library: method.built for library, method in libraries().items()}
     return {
-        name: f"{numbers} ({built[name]})" if built[name] else numbers for name, numbers in numbers_of.items()
+        name: f"{numbers} ({built[name.lower()]})" if built.get(name.lower()) else numbers
+        for name, numbers in numbers_of.items()
     }
 
 

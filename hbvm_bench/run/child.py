@@ -18,7 +18,9 @@ import threading
 import time
 import weakref
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from queue import Empty, SimpleQueue
@@ -27,7 +29,7 @@ from typing import IO, Any, Literal
 import psutil
 
 from hbvm_bench.campaign.file import Limits
-from hbvm_bench.measure import memory
+from hbvm_bench.measure import machine, memory
 
 try:
     import resource
@@ -206,6 +208,37 @@ class Child:
             peak_gib=peak,
             output=b"".join(self._printed).decode(errors="replace"),
         )
+
+
+class Idle:
+    """Processes that wait to be asked again: a run finds those of the one before, too."""
+
+    def __init__(self) -> None:
+        self._waiting: list[tuple[object, Child]] = []  # with what they serve, the longest idle first
+        self._lock = threading.Lock()
+        # Linux ends a process with the thread that started it
+        self._starter = ThreadPoolExecutor(1, thread_name_prefix="starter")
+
+    @contextmanager
+    def one(self, serves: str, *, fresh: bool = False) -> Iterator[Child]:
+        """Yield a process that serves this, or a ``fresh`` one; afterwards it waits, unless it is closed."""
+        place = serves, dict(os.environ)
+        with self._lock:
+            found = next((pair for pair in self._waiting if pair[0] == place and pair[1].alive), None)
+            if found is not None and not fresh:
+                self._waiting.remove(found)
+        child = found[1] if found is not None and not fresh else self._starter.submit(Child).result()
+        yield child
+        with self._lock:
+            self._waiting = [pair for pair in (*self._waiting, (place, child)) if pair[1].alive]
+            while len(self._waiting) > len(machine.cores()):
+                self._waiting.pop(0)[1].close()
+
+    def close(self) -> None:
+        """End those that wait."""
+        with self._lock:
+            while self._waiting:
+                self._waiting.pop()[1].close()
 
 
 def send(stream: IO[bytes], message: bytes) -> None:

@@ -1,6 +1,5 @@
 """What is asked of a process that runs cases, what it answers, and the row that comes of it."""
 
-import os
 import platform
 import tempfile
 import threading
@@ -24,6 +23,9 @@ from problems.errors import printable
 LOG_LENGTH = 4000  # characters kept of what a crashed process printed
 ENDINGS = {"timeout": "the time limit", "compiling": "still compiling", "memory": "the memory limit"}
 NO_RESULT = Result(outcome="crashed", reason="the process left no readable result", status=DIED)
+
+idle = child.Idle()
+_thread = threading.local()
 
 
 class InterruptedRunError(Exception):
@@ -144,7 +146,7 @@ def execute(request: Request) -> tuple[Record, bytes]:
     """Measure one case in a process under hard limits.
 
     Top-level and without a directory, so that any `concurrent.futures.Executor` can run it, on this machine
-    or another. The process serves the next case of this thread too, where that is one of the same library.
+    or another. The process serves the next case of the same library, too.
 
     Returns
     -------
@@ -161,8 +163,10 @@ def execute(request: Request) -> tuple[Record, bytes]:
         If the case could not be run here at all.
     """
     (row,) = request.rows
-    whole = replace(request, core=_here.core)
-    ended, answer = asked(_here.child(request), whole)
+    computation = request.computation
+    serves, fresh = (row.library, False) if computation is None else (computation.folder, computation.timed)
+    with idle.one(serves, fresh=fresh) as process:
+        ended, answer = asked(process, replace(request, core=getattr(_thread, "core", None)))
     result, series = _result(ended, answer, request.limits)
     made = replace(
         row,
@@ -198,29 +202,7 @@ def asked(process: Child, request: Request) -> tuple[Ended, Answer]:
 
 def stay_on(core: int) -> None:
     """Let the cases that this thread starts stay on one core."""
-    _here.core = core
-
-
-class _Here(threading.local):
-    """What this thread has: a core, and the process that it asked last, which ends with the thread."""
-
-    core: int | None = None
-    place: object = None
-    process: Child | None = None
-
-    def child(self, request: Request) -> Child:
-        """Return the process for a request: the last one, unless that served another library or place."""
-        loads = request.rows[0].library if request.computation is None else request.computation.folder
-        place = loads, dict(os.environ), Path.cwd()
-        fresh = request.computation is not None and request.computation.timed
-        if fresh or self.process is None or not self.process.alive or self.place != place:
-            if self.process is not None:
-                self.process.close()
-            self.process, self.place = Child(), place
-        return self.process
-
-
-_here = _Here()
+    _thread.core = core
 
 
 def _result(ended: Ended, answer: Answer, limits: Limits) -> tuple[Result, bytes]:

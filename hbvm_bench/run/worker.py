@@ -13,7 +13,7 @@ import tempfile
 import threading
 import traceback
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from queue import SimpleQueue
 from typing import IO
@@ -53,11 +53,11 @@ def main() -> None:
     # complex states are no states, and their real parts are not either
     warnings.simplefilter("error", np.exceptions.ComplexWarning)
     done: set[tuple[str, str]] = set()
-    size = 0
+    size, cores = 0, machine.cores()
     while True:
         request = msgspec.json.decode(waiting.get(), type=Request)
         try:
-            answer = _answered(request, lambda: child.send(answers, child.COMPILED), done)
+            answer = _answered(request, lambda: child.send(answers, child.COMPILED), done, cores)
         except (OSError, InputError) as error:
             if getattr(error.__cause__ or error, "errno", None) not in DISK:
                 raise
@@ -78,12 +78,13 @@ def _listen(requests: IO[bytes], waiting: "SimpleQueue[bytes]") -> None:
     os._exit(0)
 
 
-def _answered(request: Request, compiled: Callable[[], None], done: set[tuple[str, str]]) -> Answer:
+def _answered(
+    request: Request, compiled: Callable[[], None], done: set[tuple[str, str]], cores: Sequence[int]
+) -> Answer:
     """Do what a request asks; ``done`` are the libraries and problems whose code is loaded."""
     solutions.forget()
     own.add_known(request.beside)
-    if request.core is not None:
-        machine.bind([request.core])
+    machine.bind(cores if request.core is None else [request.core])
     if request.computation is not None:
         return _stored(*_computed(request.computation))
     cases = [resolve(row.case) for row in request.rows]

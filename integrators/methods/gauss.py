@@ -111,6 +111,8 @@ class Gauss(MethodBase):
     precision: Precision = "double"
 
     library = "hbvm-bench"
+    built = "compiled on this machine by numba"
+    computes_with = ("numpy", "numba", "llvmlite")
     citation = CITATION
     family = "gauss"
 

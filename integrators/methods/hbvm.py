@@ -191,6 +191,8 @@ class HBVM(MethodBase):
     projection: Projection | None = None
 
     library = "hbvm-bench"
+    built = "compiled on this machine by numba"
+    computes_with = ("numpy", "numba", "llvmlite")
     citation = CITATION
     family = "hbvm"
 

@@ -130,6 +130,8 @@ class LineIntegral(MethodBase):
     invariants: Annotated[Sequence[str], _Names()]
 
     library = "hbvm-bench"
+    built = "compiled on this machine by numba"
+    computes_with = ("numpy", "numba", "llvmlite")
     citation = CITATION
     family = "line integral"
 

@@ -71,6 +71,8 @@ class Composition(FixedStep):
     type: Type = "BM6"
 
     library = "pyhamsys"
+    built = "a loop in Python; maps compiled on this machine by numba"
+    computes_with = ("numpy", "numba")
     family = "splitting"
     citation = BLANES_MOAN
 

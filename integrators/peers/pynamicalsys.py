@@ -70,6 +70,8 @@ class Yoshida4(FixedStep):
     """
 
     library = "pynamicalsys"
+    built = "compiled on this machine by numba"
+    computes_with = ("numpy", "numba")
     family = "splitting"
     order = 4
     evaluations = 6  # each of its steps of the velocity Verlet method has two
@@ -137,6 +139,8 @@ class ImplicitMidpoint(FixedStep):
     max_iter: Count = 50
 
     library = "pynamicalsys"
+    built = "compiled on this machine by numba"
+    computes_with = ("numpy", "numba")
     family = "Gauss"
     order = 2
     citation = PYNAMICALSYS

@@ -63,6 +63,8 @@ class CVODE(MethodBase):
     method: Literal["BDF", "Adams"] = "BDF"
 
     library = "scikit-sundae"
+    built = "generic wheel; vector field and Jacobian compiled on this machine by numba"
+    computes_with = ("numpy", "numba")
     family = "multistep"
     citation = SUNDIALS
     to_end = "stop"

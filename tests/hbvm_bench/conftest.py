@@ -33,6 +33,13 @@ TOYS = (
 SHORT = "sitnikov(t_end=1.0)"
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call():
+    """Let all tests have one environment: a process that waits to be asked again serves one alone."""
+    os.environ.pop("PYTEST_CURRENT_TEST", None)
+    return (yield)
+
+
 @pytest.fixture(scope="session")
 def toy_path(tmp_path_factory):
     """Return folders that, on the path, are an installed distribution of toy methods."""

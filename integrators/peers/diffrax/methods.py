@@ -35,6 +35,8 @@ class DiffraxMethod(MethodBase):
 
     evaluations: ClassVar[int | None]  # of a step; None: not known
     library = "diffrax"
+    built = "compiled on this machine by XLA"
+    computes_with = ("jax", "jaxlib", "equinox", "lineax", "optimistix")
     to_end = "end"
     citation = KIDGER
 

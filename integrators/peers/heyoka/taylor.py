@@ -97,6 +97,7 @@ class Taylor(MethodBase):
     fast_math: bool = False
 
     library = "heyoka"
+    built = "compiled on this machine by LLVM"
     citation = CITATION
     family = "taylor"
     to_end = "stop"

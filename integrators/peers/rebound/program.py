@@ -39,6 +39,7 @@ class ReboundMethod(MethodBase):
     """What REBOUND's methods share."""
 
     library = "rebound"
+    built = "generic wheel"
     counted: ClassVar[bool] = True  # whether REBOUND tells of each evaluation of the forces
 
     def accepts(self, problem: Problem) -> str | None:

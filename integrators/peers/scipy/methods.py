@@ -87,6 +87,8 @@ class SciPyMethod(MethodBase):
     implicit: ClassVar[bool] = False  # whether it takes a Jacobian
     multistep: ClassVar[bool] = False
     library = "scipy"
+    built = "generic wheel; vector field compiled on this machine by numba"
+    computes_with = ("numpy", "numba")
     to_end = "stop"
 
     def __post_init__(self) -> None:

@@ -11,7 +11,7 @@ import integrators
 import problems
 from hbvm_bench.campaign.file import Case, Ensemble, Limits, TimingPlan
 from hbvm_bench.campaign.identity import make_method
-from hbvm_bench.measure import ensemble, timing
+from hbvm_bench.measure import ensemble, machine, timing
 from hbvm_bench.run import task, worker
 from hbvm_bench.store.records import Record
 from integrators.protocol import MethodBase, Samples, Stats, Status
@@ -121,7 +121,7 @@ def test_a_case_s_clock_begins_when_all_is_compiled(monkeypatch):
     monkeypatch.setattr(timing, "time_together", lambda runs, *_: [runs[0].program.now])
     row = Record(id="1", case=asked, role="ours", library="", order=1, result=task.NO_RESULT)
     request = task.Request(rows=[row], limits=Limits(), plan=TimingPlan())
-    assert worker._answered(request, lambda: said.append(True), set()).timings == b"[1000.0]"
+    assert worker._answered(request, lambda: said.append(True), set(), machine.cores()).timings == b"[1000.0]"
     assert said
 
 

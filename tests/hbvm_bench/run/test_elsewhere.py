@@ -27,7 +27,7 @@ def hidden(monkeypatch):
     monkeypatch.setattr(memory, "PROCESSES", Path("nowhere"))
     monkeypatch.setattr(memory, "resource", None)
     monkeypatch.setattr(child, "resource", None)
-    task._here.process = None
+    task.idle.close()
 
 
 def all_end(processes):
