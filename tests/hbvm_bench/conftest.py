@@ -34,7 +34,7 @@ SHORT = "sitnikov(t_end=1.0)"
 
 
 @pytest.hookimpl(wrapper=True)
-def pytest_runtest_call():
+def pytest_pyfunc_call():
     """Let all tests have one environment: a process that waits to be asked again serves one alone."""
     os.environ.pop("PYTEST_CURRENT_TEST", None)
     return (yield)

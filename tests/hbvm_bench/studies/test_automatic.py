@@ -1,10 +1,5 @@
 """The race of HBVM without settings."""
 
-import re
-import signal
-import subprocess
-import sys
-
 import msgspec
 import pytest
 
@@ -97,26 +92,3 @@ def test_a_side_on_another_trajectory_has_no_ratio():
     (pair,) = automatic.head_to_heads(msgspec.structs.replace(run, records=[lost, ours]))
     assert pair.ratio is None
     assert pair.words == "not compared"
-
-
-@pytest.mark.slow
-def test_a_run_that_was_killed_goes_on_where_it_was(tmp_path, monkeypatch, capsys):
-    """Nothing is lost, and nothing is done twice; times in one process are taken as a whole."""
-    pytest.importorskip("heyoka")
-    monkeypatch.chdir(tmp_path)
-    arguments = ["automatic", "henon_heiles", "kepler", "--rounds", "2"]
-    command = [sys.executable, "-m", "hbvm_bench.cli", *arguments]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True) as run:
-        assert run.stderr is not None
-        for line in run.stderr:
-            if re.search(r"\[2/4\]", line):
-                break
-        run.send_signal(signal.SIGKILL)
-    cases = tmp_path / "runs" / "automatic" / "cases"
-    before = {path.name: path.stat().st_mtime_ns for path in cases.glob("*.npz")}
-    assert len(before) >= 2
-    assert main(arguments) == 0
-    assert f"4, {len(before)} already there" in capsys.readouterr().err
-    after = {path.name: path.stat().st_mtime_ns for path in cases.glob("*.npz")}
-    assert before.items() <= after.items()
-    assert len(after) == 4

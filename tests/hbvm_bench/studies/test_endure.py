@@ -1,8 +1,4 @@
 import json
-import re
-import signal
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -150,25 +146,6 @@ def test_endure_runs_and_prints_json(tmp_path, capsys):
     assert main(["report", str(tmp_path / "report"), "-o", str(tmp_path / "third")]) == 0
     pages = [(tmp_path / name / "README.md").read_bytes() for name in ("report", "again", "third")]
     assert len(set(pages)) == 1
-
-
-@pytest.mark.slow
-def test_a_run_that_was_killed_goes_on_where_it_was(tmp_path, capsys):
-    """Nothing is lost, and nothing is done twice."""
-    command = [sys.executable, "-m", "hbvm_bench.cli", *ARGUMENTS, "--out", str(tmp_path)]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True) as run:
-        assert run.stderr is not None
-        for line in run.stderr:
-            if re.search(r"\[1/2\]", line):
-                break
-        run.send_signal(signal.SIGKILL)
-    before = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "cases").glob("*.npz")}
-    assert before
-    assert main([*ARGUMENTS, "--out", str(tmp_path)]) == 0
-    assert f"{len(before)} already there" in capsys.readouterr().err
-    after = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "cases").glob("*.npz")}
-    assert before.items() <= after.items()
-    assert len(after) == 2
 
 
 @pytest.mark.parametrize(

@@ -1,9 +1,4 @@
 import json
-import re
-import signal
-import subprocess
-import sys
-import time
 
 import pytest
 
@@ -54,49 +49,3 @@ def test_the_settings_are_printed_without_running(capsys):
     said = capsys.readouterr().out
     assert "Gauss(s=16, h=0.5)" in said
     assert "heyoka, Taylor, adaptive step size, 16" in said
-
-
-COMMAND = ["race", "--quick", "--problem", "kepler", "--rounds", "2"]
-
-
-def stopped(directory, sent, sign):
-    """Start a race, send a signal when so many of its cases have ended, and return its exit code."""
-    command = [sys.executable, "-m", "hbvm_bench.cli", *COMMAND, "--out", str(directory)]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True) as race:
-        assert race.stderr is not None
-        for line in race.stderr:
-            if re.search(sent, line):
-                break
-        race.send_signal(sign)
-        begun = time.monotonic()
-        said = race.stderr.read()
-        code = race.wait(timeout=20)
-    assert time.monotonic() - begun < 10
-    assert "Traceback" not in said
-    return code, said
-
-
-def test_ctrl_c_ends_the_race_at_once_with_130(tmp_path):
-    code, said = stopped(tmp_path, r"\[1/\d+\]", signal.SIGINT)
-    assert code == 130
-    assert "interrupted" in said
-
-
-@pytest.mark.slow
-def test_a_race_that_was_killed_goes_on_where_it_was(tmp_path, capsys):
-    """Nothing is lost, and nothing is done twice, whether it was measuring or timing."""
-    pytest.importorskip("heyoka")
-    stopped(tmp_path, r"\[3/\d+\]", signal.SIGKILL)
-    before = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "cases").glob("*.npz")}
-    assert len(before) >= 3
-    code, _ = stopped(tmp_path, "round 1", signal.SIGKILL)
-    assert code == -signal.SIGKILL
-    measured = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "cases").glob("*.npz")}
-    assert before.items() <= measured.items()
-    assert main([*COMMAND, "--out", str(tmp_path)]) == 0
-    assert "21, 21 already there" in capsys.readouterr().err
-    after = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "cases").glob("*.npz")}
-    assert after == measured
-    (race,) = results.races_of(gather([Store(tmp_path)]))
-    assert {one.timing.process for one in race.records if one.timing} != {""}
-    assert all(len(one.timing.rounds) == 2 for one in race.records if one.timing and one.timing.rounds)
