@@ -5,6 +5,7 @@ nothing is imported until its name is asked for.
 """
 
 from functools import cache
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from integrators.protocol import MethodBase
@@ -63,7 +64,7 @@ def get(name: str) -> type[MethodBase]:
 
 def libraries() -> dict[str, type[MethodBase]]:
     """Return the libraries whose methods come with this package, each with one of these."""
-    methods = (get(own[0]) for own in BUILT_IN.values())
+    methods = (getattr(import_module(module), own[0]) for module, own in BUILT_IN.items())
     return {method.library: method for method in methods}
 
 

@@ -6,8 +6,7 @@ it, from the same traced vector field as everything else, by two methods that sh
 
 import ast
 import hashlib
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from decimal import Context, Decimal
@@ -160,16 +159,6 @@ def add_known(text: str) -> None:
 def forget() -> None:
     """Know the references of the package alone."""
     _known.set({})
-
-
-@contextmanager
-def apart() -> Iterator[None]:
-    """Know the references of the package alone at first, and afterwards what was known before."""
-    token = _known.set({})
-    try:
-        yield
-    finally:
-        _known.reset(token)
 
 
 def made_here(problem: Problem) -> str:

@@ -234,12 +234,6 @@ class Idle:
             while len(self._waiting) > len(machine.cores()):
                 self._waiting.pop(0)[1].close()
 
-    def close(self) -> None:
-        """End those that wait."""
-        with self._lock:
-            while self._waiting:
-                self._waiting.pop()[1].close()
-
 
 def send(stream: IO[bytes], message: bytes) -> None:
     """Write a message for `received`."""

@@ -17,8 +17,22 @@ WORDS = {"title", "description", "note", "words", "alone", "name", "lead", "seri
 FREE = {"values", "sweep"}
 """Tables whose keys are the file's own names."""
 
-QUICK = ("smoke", "endure", "automatic", "ensemble", "outer-solar-system", "sitnikov", "work-precision")
-SLOW = ("general", "drift", "race", "peers", "paper", "encounters", "large")
+QUICK = ("smoke", "endure", "ensemble")
+SLOW = (
+    *(
+        "automatic",
+        "outer-solar-system",
+        "sitnikov",
+        "work-precision",
+        "general",
+        "drift",
+        "race",
+        "peers",
+        "paper",
+        "encounters",
+        "large",
+    ),
+)
 FOLDERS = ("chaos", "random", "costs")
 """Studies of ours that are folders with code."""
 

@@ -7,7 +7,7 @@ import pytest
 import integrators.registry
 from hbvm_bench.campaign.identity import resolve
 from hbvm_bench.measure import reading
-from hbvm_bench.run.task import execute, request_of
+from hbvm_bench.run.task import execute, idle, request_of
 from hbvm_bench.store.store import Store
 from problems.errors import InputError
 
@@ -62,6 +62,12 @@ def toys(toy_path, monkeypatch):
     yield
     integrators.registry._entries.cache_clear()
     sys.modules.pop("toy_methods", None)
+
+
+def end_idle():
+    """End the processes that wait to be asked again."""
+    for _, process in idle._waiting:
+        process.close()
 
 
 def run_case(case, directory, limits):

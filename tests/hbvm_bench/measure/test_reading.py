@@ -43,9 +43,15 @@ def run(directory, problem, methods, grid=None):
     return made
 
 
+@pytest.fixture(scope="module")
+def place(tmp_path_factory):
+    return tmp_path_factory.mktemp("read") / "run"
+
+
 @pytest.fixture
-def store(toys, tmp_path):
-    return run(tmp_path / "run", SHORT, METHODS)
+def store(toys, place):
+    """Return the store of one run for all tests, which read it."""
+    return Store(place) if place.exists() else run(place, SHORT, METHODS)
 
 
 def is_complete(store):

@@ -99,17 +99,6 @@ def test_a_run_does_not_know_the_reference_of_another_run(tmp_path):
         assert solutions.find_file(problem) == expected  # before: the last one that anybody had learned
 
 
-def test_a_task_of_another_run_leaves_what_is_known_here():
-    problem = problems.load("pendulum", q=0.3, t_end=7.0)
-    solutions.add_known(solutions.encode(solutions.of_end(problem, [0.1, 0.2])))
-    try:
-        with solutions.apart():
-            assert solutions.find_file(problem) is None
-        assert solutions.find_file(problem) is not None
-    finally:
-        solutions.forget()
-
-
 def test_a_rounded_number_is_rounded_in_more_digits_too():
     system = problems.VectorField(lambda y, m: [y[0] - m.round(y[0])], dim=1)
     made = targets.source(system, "field", "numba")

@@ -11,11 +11,11 @@ import pytest
 
 from hbvm_bench.campaign.file import Case, Grid, Limits
 from hbvm_bench.measure import doctor, machine, memory, timing
-from hbvm_bench.run import child, task
+from hbvm_bench.run import child
 from hbvm_bench.run.child import Child
 from hbvm_bench.store.store import Store
 from tests.elsewhere import elsewhere
-from tests.hbvm_bench.conftest import SHORT, run_case
+from tests.hbvm_bench.conftest import SHORT, end_idle, run_case
 
 
 @pytest.fixture
@@ -27,7 +27,7 @@ def hidden(monkeypatch):
     monkeypatch.setattr(memory, "PROCESSES", Path("nowhere"))
     monkeypatch.setattr(memory, "resource", None)
     monkeypatch.setattr(child, "resource", None)
-    task.idle.close()
+    end_idle()
 
 
 def all_end(processes):

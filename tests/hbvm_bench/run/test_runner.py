@@ -17,7 +17,7 @@ from hbvm_bench.measure import memory, reading
 from hbvm_bench.run import child, executors, loop, task, timing_pass
 from hbvm_bench.run.child import Child
 from hbvm_bench.store.store import Store
-from tests.hbvm_bench.conftest import SHORT, run_case
+from tests.hbvm_bench.conftest import SHORT, end_idle, run_case
 
 GENEROUS = Limits(wall_seconds=30, memory_gib=2)
 PLAN = TimingPlan(rounds=3, shortest=1e-6)
@@ -261,7 +261,7 @@ def wait_for(condition):
 
 
 def test_a_stopped_run_stores_nothing_and_leaves_no_process(toys, store):
-    task.idle.close()
+    end_idle()
     before = set(children())
     pool = concurrent.futures.ThreadPoolExecutor(1)
     future = pool.submit(run_case, case("Endless()"), str(store.directory), GENEROUS)
@@ -287,7 +287,7 @@ def numbers(record):
     "method", ["Waving(h=0.3)", "HBVM(k=8, s=2, h=0.25)", "IAS15()", "Taylor(tol=1e-12)"]
 )
 def test_a_case_has_the_same_numbers_in_a_process_that_served_one_as_in_a_new_one(toys, store, method):
-    task.idle.close()
+    end_idle()
     fresh = run(store, method)
     series = store.series(fresh.id)
     again = run(store, method)
@@ -302,7 +302,7 @@ def test_a_case_that_ends_badly_costs_its_process_and_no_other_case(toys, store)
     methods = ["Counting(h={})", "Counting(h={})", "Crashing(number=11)", "Counting(h={})", "Hungry()"]
     methods += ["Counting(h={}, leaves='child')", "Counting(h={})", "Counting(h={})"]
     limits = Limits(wall_seconds=30, memory_gib=0.4)
-    task.idle.close()
+    end_idle()
     records = [run(store, method.format(0.1 + i), limits) for i, method in enumerate(methods)]
     assert [record.result.outcome for record in records] == [
         "ok", "ok", "crashed", "ok", "killed", "ok", "ok", "ok",
@@ -314,7 +314,7 @@ def test_a_case_that_ends_badly_costs_its_process_and_no_other_case(toys, store)
 
 
 def test_another_library_has_another_process(toys, store):
-    task.idle.close()
+    end_idle()
     for method in ("Counting(h=1.0)", "IAS15()", "Counting(h=2.0)"):
         record = run(store, method)
     assert record.result.counters.steps == 2
@@ -327,7 +327,7 @@ def waiting():
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
 def test_a_process_that_was_ended_or_stopped_while_it_had_nothing_to_do(toys, store, number):
-    task.idle.close()
+    end_idle()
     run(store, "Steady(h=0.3)")
     (process,) = waiting()
     os.kill(process.process.pid, number)
