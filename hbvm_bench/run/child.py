@@ -168,9 +168,8 @@ class Child:
         start = time.monotonic() if self.asked else self.born
         self.asked = True
         self._printed.clear()
-        assert self.process.stdin is not None
-        with contextlib.suppress(OSError):  # it has ended: there will be no answer
-            send(self.process.stdin, request)
+        # not here: a process that is stopped may never read it, and has its limits all the same
+        threading.Thread(target=_give, args=(self.process.stdin, request), daemon=True).start()
         begun = None if compiles else start
         reply: bytes | None = None
         cause: Cause = "exit"
@@ -246,6 +245,11 @@ def received(stream: IO[bytes]) -> bytes:
     length = int.from_bytes(stream.read(LENGTH), "big")
     message = stream.read(length)
     return message if len(message) == length else b""
+
+
+def _give(stream: IO[bytes], request: bytes) -> None:
+    with contextlib.suppress(OSError, ValueError):  # it has ended: there will be no answer
+        send(stream, request)
 
 
 def take(stream: IO[bytes], messages: "SimpleQueue[bytes]") -> None:

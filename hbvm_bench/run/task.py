@@ -111,6 +111,8 @@ class Answer(msgspec.Struct, frozen=True, kw_only=True):
 
     Attributes
     ----------
+    leaves : bool
+        Whether the process is to serve no further case, and what it printed is wanted to the end.
     refusal : str
         Why nothing of it can be done in this place; empty where it was.
     result : bytes
@@ -121,6 +123,7 @@ class Answer(msgspec.Struct, frozen=True, kw_only=True):
         JSON of the `Timing` of each row.
     """
 
+    leaves: bool = False
     refusal: str = ""
     result: bytes = b""
     series: bytes = b""

@@ -47,7 +47,8 @@ def main() -> None:
     """Answer the requests at the input until it ends, as it does with the parent."""
     child.limit()
     answers, requests = os.fdopen(os.dup(1), "wb"), os.fdopen(os.dup(0), "rb")
-    os.dup2(2, 1)  # what is printed is no answer
+    os.dup2(2, 1)  # what is printed is no answer, and what is read no request
+    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
     waiting: SimpleQueue[bytes] = SimpleQueue()
     threading.Thread(target=_listen, args=(requests, waiting), daemon=True).start()
     # complex states are no states, and their real parts are not either
@@ -67,10 +68,10 @@ def main() -> None:
         memory.forget_peak()
         held = memory.own_peak()
         size = size or held
-        stays = held - size < GROWTH and not psutil.Process().children()
+        leaves = answer.leaves or held - size > GROWTH or psutil.Process().children()
         sys.stdout.flush()
         sys.stderr.flush()
-        child.send(answers, (child.STAYS if stays else child.LEAVES) + msgspec.msgpack.encode(answer))
+        child.send(answers, (child.LEAVES if leaves else child.STAYS) + msgspec.msgpack.encode(answer))
 
 
 def _listen(requests: IO[bytes], waiting: "SimpleQueue[bytes]") -> None:
@@ -108,7 +109,8 @@ def _answered(
 
 
 def _stored(result: Result, series: Series) -> Answer:
-    return Answer(result=msgspec.json.encode(result), series=encode(series) if series else b"")
+    arrays = encode(series) if series else b""
+    return Answer(result=msgspec.json.encode(result), series=arrays, leaves=result.outcome == "crashed")
 
 
 def _difference(row: Record, here: Resolved) -> str:

@@ -5,26 +5,24 @@ and prints the seconds as JSON; `probe` starts it with caches of its own.
 """
 
 import hashlib
-import os
-import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
 import msgspec
 
-from hbvm_bench.campaign.file import Case
-from hbvm_bench.run.child import ENVIRONMENT, empty_caches
+from hbvm_bench.campaign.file import Case, Limits
+from hbvm_bench.run.child import LEAVES, Child, empty_caches, send
 from hbvm_bench.store.records import Record, Result
 from hbvm_bench.studies.race.families import OURS
+from problems.errors import InputError
 
 KEY = "compile times of "  # how the keys of these rows begin; the problem follows
 TIMES = 3
 SLOW = 5.0  # seconds; what takes longer is measured once
-LIMIT = 180.0  # seconds
+LIMITS = Limits(wall_seconds=180.0)
 SHARE = 1e-3
 OTHER = "pendulum(t_end=1.0)"  # fills the kernel's cache without the problem's vector field
 
@@ -116,9 +114,8 @@ def _probes(name: str, problem: str, family: str, method: str) -> list[Probe]:
                     replies["kernel"].append(_ask(problem, method, Path(cache)))
             if replies["empty"][0][0] > SLOW:
                 break
-    except (subprocess.SubprocessError, msgspec.MsgspecError) as error:
-        reason = f"the process that compiles {method} failed: {type(error).__name__}"
-        return [Probe(problem=name, family=family, method=method, caches="empty", reason=reason)]
+    except InputError as error:
+        return [Probe(problem=name, family=family, method=method, caches="empty", reason=str(error))]
     return [
         Probe(
             problem=name,
@@ -136,17 +133,12 @@ def _probes(name: str, problem: str, family: str, method: str) -> list[Probe]:
 
 
 def _ask(problem: str, method: str, cache: Path) -> tuple[float, Answer]:
-    start = time.perf_counter()
-    done = subprocess.run(
-        [sys.executable, "-m", "hbvm_bench.studies.race.probe", problem, method],
-        env={**os.environ, **ENVIRONMENT, **empty_caches(cache)},
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        timeout=LIMIT,
-        check=True,
-    )
-    return time.perf_counter() - start, msgspec.json.decode(done.stdout, type=Answer)
+    process = Child(empty_caches(cache), ("-m", "hbvm_bench.studies.race.probe", problem, method))
+    ended = process.ask(b"", LIMITS, compiles=False)
+    process.close()
+    if not ended.reply:
+        raise InputError(f"the process that compiles {method} {ended.words}.")
+    return ended.seconds, msgspec.json.decode(ended.reply, type=Answer)
 
 
 def main(problem_text: str, method_text: str) -> None:
@@ -163,7 +155,7 @@ def main(problem_text: str, method_text: str) -> None:
         end = problem.t0 + SHARE * (problem.t_end - problem.t0)
         program.start(problem.y0, problem.par, problem.t0).advance(np.array([end]))
         answer = Answer(float(program.compile_seconds), program.from_cache)
-    sys.stdout.buffer.write(msgspec.json.encode(answer))
+    send(sys.stdout.buffer, LEAVES + msgspec.json.encode(answer))
 
 
 if __name__ == "__main__":
