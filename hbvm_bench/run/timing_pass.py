@@ -56,9 +56,8 @@ def time_cases(
             read = [reading.up_to_date(store, row) for _, row in group]
             timings = _together(group, read, plan, limits, core)
             process = datetime.now(UTC).isoformat()
-            for (_, row), timing in zip(group, timings, strict=True):
-                taken = replace(timing, plan=plan, machine=here, process=process)
-                store.save(replace(row, timing=taken))
+            taken = [replace(timing, plan=plan, machine=here, process=process) for timing in timings]
+            store.renew([replace(row, timing=t) for (_, row), t in zip(group, taken, strict=True)])
 
 
 def missing_visits(cases: Sequence[Resolved], store: Store, plan: TimingPlan) -> int:

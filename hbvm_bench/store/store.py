@@ -183,13 +183,10 @@ class Store:
 
         Arrays are not compressed for a file that is compressed as a whole.
         """
-        result, text = record.result, msgspec.json.encode(record).decode()
-        row = (self.run, record.id, record.case.problem, record.case.method, record.library)
-        row += (result.outcome, result.status, record.finished, text)
         if isinstance(arrays, bytes):
             arrays = packing.decode(arrays) if arrays else None
         with self._writing() as database:
-            database.execute("INSERT OR REPLACE INTO results VALUES (?,?,?,?,?,?,?,?,?)", row)
+            self._put(database, record)
             if arrays is not None:
                 database.execute("DELETE FROM arrays WHERE run=? AND id=?", (self.run, record.id))
                 blobs = (
@@ -198,6 +195,18 @@ class Store:
                 )
                 rows = ((self.run, record.id, *blob) for blob in blobs)
                 database.executemany("INSERT INTO arrays VALUES (?,?,?,?)", rows)
+
+    def renew(self, records: Sequence[Record]) -> None:
+        """Store records whose arrays stay, all of them in one transaction."""
+        with self._writing() as database:
+            for record in records:
+                self._put(database, record)
+
+    def _put(self, database: sqlite3.Connection, record: Record) -> None:
+        result, text = record.result, msgspec.json.encode(record).decode()
+        row = (self.run, record.id, record.case.problem, record.case.method, record.library)
+        row += (result.outcome, result.status, record.finished, text)
+        database.execute("INSERT OR REPLACE INTO results VALUES (?,?,?,?,?,?,?,?,?)", row)
 
     def series(self, case_id: str) -> dict[str, NDArray[np.float64]]:
         """Return the arrays of a case by name; empty where it has none.

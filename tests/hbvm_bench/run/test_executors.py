@@ -127,7 +127,7 @@ def test_a_scheduler_that_is_killed_costs_no_finished_case(toys, tmp_path):
 CAMPAIGN = """
 name = "killed"
 problems = ["{problem}", "sitnikov(t_end=2.0)"]
-methods = [{{ use = "Waving(h={{h}}, wait=0.1)", sweep = {{ h = [0.1, 0.2, 0.3] }} }}]
+methods = [{{ use = "Steady(h={{h}}, wait=0.1)", sweep = {{ h = [0.1, 0.2, 0.3] }} }}]
 timing = {{ rounds = {rounds}, shortest = 0.02 }}
 """
 
