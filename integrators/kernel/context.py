@@ -50,7 +50,7 @@ Integers = NDArray[np.int64]
 # pushes back to a switching surface from both sides. ACTS: an event in the step changes the state.
 # ACCUMULATE: such events come after ever shorter times. ANEW: one has happened within a step of fixed size,
 # and steps are counted from there. RENEW: one has changed parameters, and what follows from them is not yet
-# renewed. NOISY: the field's noise keeps the equations of the step from being solved.
+# renewed. NOISY: noise of a field that is called may be what keeps steps short.
 RUNNING, DONE, DIVERGED, NOT_FINITE, BUDGET, UNDERFLOW, SCATTERED, NOT_KEPT, HALTED = range(9)
 UNSCALED, MISSED, SLIDING, ACTS, ACCUMULATE, ANEW, RENEW, NOISY = range(9, 17)
 

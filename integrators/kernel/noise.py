@@ -1,34 +1,49 @@
-"""The noise of a field, and the sentence that ends a run by it."""
+"""The noise of a field that is called, and the sentence that ends a run by it."""
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
+from integrators.kernel.step.rule import FLOOR, SMALLEST
 from integrators.protocol import Array, Status
 
-POINTS, DEGREES = 9, (4, 5, 6)
-# Distance of the points beside the size of the state: a field in single precision changes from each to the
-# next, and differences of such degrees vanish for smooth functions.
-APART = 2.0**-20
+POINTS = 16
+# Of the state's size, the lengths of the lines: on the first there are a few thousand doubles, the last is
+# for values that are rounded to one digit.
+FIRST, LONGER, LONGEST = 2.0**-40, 2.0**10, 1.0
+GOLDEN = 0.618  # multiples of it, but for their integers, are in no order
+FLAT = 0.25  # coefficients of high degree that are at least this part of the middle ones do not fall off
 UNIT, BEYOND_ROUNDING = 2.0**-52, 100.0
-MARGIN = 100.0  # times what noise adds in a step is a tolerance that can be had
-MOST = 1e-3  # a looser tolerance is no advice
+MARGIN = 30.0  # times what noise adds while the state changes by its size is a tolerance that can be had
+MOST = 0.1  # a looser tolerance is no advice
+
+_X = 0.5 - 0.5 * np.cos(np.pi * (np.arange(POINTS) + 0.5) / POINTS)
+# Chebyshev coefficients of independent values of deviation 1, all of the same size
+_COEFFICIENTS = np.cos(np.pi * np.outer(np.arange(POINTS), np.arange(POINTS) + 0.5) / POINTS) * math.sqrt(
+    2.0 / POINTS
+)
 
 
-def field_noise(field: Callable[[Array], Array], y: Array) -> Array:
+def field_noise(field: Callable[[float, Array], Array], t: float, h: float, y: Array) -> Array:
     """Return the standard deviation of the noise of a field near a state, for each component.
 
-    By J. J. More and S. M. Wild, "Estimating computational noise", SIAM J. Sci. Comput. 33 (2011) 1292-1314:
-    differences of high degree on a line through the state are those of noise alone, and of degree m they are
-    sqrt((2m)!)/m! times as large as that. The least is taken, of some degrees, and of two lines that begin at
-    the state in opposite directions: a discontinuity is on one of them.
+    By the idea of J. J. More and S. M. Wild, "Estimating computational noise", SIAM J. Sci. Comput. 33 (2011)
+    1292-1314: on so short a line a smooth field is a polynomial of low degree, and what is found of high
+    degrees is noise, of the same size in all of them. As there, the line is longer where half of the values
+    on it are equal, those of a field that is rounded. Coefficients take the place of differences, since those
+    of rounded values at equal distances may vanish. The least is taken of two lines that begin at the
+    state in opposite directions: a discontinuity is on one of them.
 
     Parameters
     ----------
     field : callable
-        Returns the derivatives at a state.
+        Returns the derivatives at a time and a state.
+    t, h : float
+        The lines are in the step from t of length h.
     y : array, shape (dim,)
+        What is exactly 0 stays 0: the field may not be defined, or another one, beside it.
 
     Returns
     -------
@@ -36,38 +51,69 @@ def field_noise(field: Callable[[Array], Array], y: Array) -> Array:
         0 where rounding of the state and of the derivatives explains what is found, or the field is not
         finite.
     """
-    size = np.abs(y).max()
-    away = APART * np.where(y != 0.0, np.abs(y), size)
-    found, rounding = np.full(len(y), np.inf), np.zeros(len(y))
-    for side in (away, -away):
-        differences = np.array([field(y + i * side) for i in range(POINTS)])
-        values = np.abs(differences).max(axis=0)
-        for degree in range(1, max(DEGREES) + 1):
-            differences = np.diff(differences, axis=0)
-            if degree == 1:
-                steep = np.abs(differences).max(axis=0) / APART
-                rounding = np.maximum(rounding, UNIT * np.maximum(values, steep))
-            if degree in DEGREES:
-                part = math.factorial(degree) ** 2 / math.factorial(2 * degree)
-                found = np.minimum(found, np.sqrt(part * np.mean(differences**2, axis=0)))
-    return np.where(np.isfinite(found) & (found > BEYOND_ROUNDING * rounding), found, 0.0)
+    order = GOLDEN * np.arange(1, len(y) + 1) % 1.0
+    away = (0.5 + order) * np.where(order * 64.0 % 2.0 < 1.0, 1.0, -1.0) * y  # terms do not cancel on all
+    return np.minimum(*(_on_line(field, t, h, y, side * away) for side in (1.0, -1.0)))
 
 
-def noisy(t: float, h: float, added: float) -> tuple[Status, str]:
-    """Return the status of a run that the noise of the field has ended, and the reason as a sentence.
+def _on_line(field: Callable[[float, Array], Array], t: float, h: float, y: Array, away: Array) -> Array:
+    """Return the same from lines in one direction."""
+    noise = np.full(len(y), np.nan)
+    length = FIRST
+    while np.isnan(noise).any() and length <= LONGEST:
+        values = np.array([field(t + length * x * h, y + length * x * away) for x in _X])
+        known = np.count_nonzero(np.diff(values, axis=0), axis=0) >= POINTS // 2
+        found = np.where(known, _on_one_length(values, length), np.nan)
+        noise = np.where(np.isnan(noise), found, noise)
+        length *= LONGER
+    return np.nan_to_num(noise)
 
-    Parameters
-    ----------
-    t, h : float
-        Start and length of the step.
-    added : float
-        What noise adds to the state in it, relative to its size.
-    """
-    tolerance = 10.0 ** math.ceil(math.log10(MARGIN * added))
-    advice = "give a field that is smooth to rounding"
-    if tolerance <= MOST:
-        advice += f", or tol={tolerance:.0e} or more"
-    return Status.NONLINEAR_DIVERGENCE, (
-        f"the values of the vector field have noise: in a step of h = {h!r} from t = {t!r} it adds "
-        f"{added:.0e} of the state's size; {advice}."
+
+def _on_one_length(values: Array, length: float) -> Array:
+    """Return the noise of values on a line of a length, 0 where they are smooth or not finite."""
+    coefficients = np.abs(_COEFFICIENTS @ values)
+    half = POINTS // 2
+    middle, high = (
+        np.sqrt(np.mean(part**2, axis=0)) for part in (coefficients[half // 2 : half], coefficients[half:])
     )
+    rounding = UNIT * np.maximum(np.abs(values).max(axis=0), np.ptp(values, axis=0) / length)
+    return np.where((high > BEYOND_ROUNDING * rounding) & (high > FLAT * middle), high, 0.0)
+
+
+@dataclass(frozen=True)
+class Noise:
+    """The noise of a field near a state.
+
+    Attributes
+    ----------
+    values : array, shape (dim,)
+        Its standard deviation; see `field_noise`.
+    slope, y : array, shape (dim,)
+        The field there, and the state.
+    """
+
+    values: Array
+    slope: Array
+    y: Array
+
+    def added(self, h: float) -> float:
+        """Return what it adds to a component in a step of length h, relative to its size, at most."""
+        size = np.maximum(np.abs(self.y), FLOOR * np.abs(self.y).max()) + abs(h) * np.abs(self.slope)
+        return float(np.max(abs(h) * self.values / np.maximum(size, SMALLEST)))
+
+    @property
+    def relative(self) -> float:
+        """The noise relative to the field: what it adds while the state changes by its size."""
+        return float(self.values.max() / max(np.abs(self.slope).max(), self.values.max()))
+
+    def ends(self, t: float, h: float) -> tuple[Status, str]:
+        """Return the status of a run that it has ended in a step from t, and the reason as a sentence."""
+        tolerance = 10.0 ** math.ceil(math.log10(MARGIN * self.relative))
+        advice = "give a field that is smooth to rounding"
+        if tolerance <= MOST:
+            advice += f", or tol={tolerance:.0e} or more"
+        return Status.NONLINEAR_DIVERGENCE, (
+            f"the values of the vector field have noise of {self.values.max():.0e}, too much for the step of "
+            f"h = {h!r} from t = {t!r}: while the state changes by its size, it adds {self.relative:.0e} "
+            f"of that; {advice}."
+        )

@@ -37,12 +37,11 @@ from integrators.kernel.implicit.workspace import Solver, Workspace, report
 from integrators.kernel.line.kept import Kept
 from integrators.kernel.native import binary
 from integrators.kernel.native.memory import address
-from integrators.kernel.noise import field_noise, noisy
+from integrators.kernel.noise import Noise, field_noise
 from integrators.kernel.pace import FEWEST, Pace
 from integrators.kernel.parts.implicit import ALWAYS_IMPLICIT, AUTO, FOR_VECTORS, NOT_WANTED
 from integrators.kernel.searches import LastingSearch
 from integrators.kernel.spare import Pair, Spare
-from integrators.kernel.step.rule import STAGNATION
 from integrators.kernel.tables import Constants
 from integrators.kernel.tangent.frames import Frames
 from integrators.kernel.tangent.group import Directions
@@ -72,9 +71,7 @@ SHORTEST_TIME = 64  # units in the last place: nothing happens in a time as shor
 FROM_UNDEFINED = (Status.NOT_FINITE, Status.STEP_UNDERFLOW, Status.NONLINEAR_DIVERGENCE)
 FIRST_HELD = 16  # steps for which the implicit solver stays at work when it is made; `solve` has more
 
-# Changes that noise makes in a step, relative: an iteration stagnates at ten times as much, and is over at
-# `step.rule.STAGNATION`.
-LEAST_NOISE = 0.1 * STAGNATION
+EXPLAINED = 100.0  # times what noise adds in a step: more may an iteration not leave for its sake
 
 Ended = tuple[Status, str]  # how a run is over before its end, and the reason as a sentence
 Filled = tuple[Array, int, Ended | None]  # samples, how the kernel came back, and why they are the last
@@ -163,14 +160,15 @@ class HBVMStepper(ABC):
         "pace.previous_log_density", "pace.density_slope", "controller.interval", "controller.no_time_scale",
         "estimate.constant_field", "estimate.rescaled", "estimate.borrowed", "estimate.asks", "energy.start",
         "energy.scale", "solver.tolerance", "solver.stagnation", "solver.trusted", "solver.log_trusted",
-        "solver.log_residual",
+        "solver.log_residual", "estimate.noisy", "estimate.troubles", "estimate.next_look",
+        "estimate.spacing",
     )  # fmt: skip
     _arrays: ClassVar[tuple[str, ...]] = (
         "state", "error", "next_state", "next_error", "values", "older_values", "blocks.weights",
         "blocks.floored_weights", "discontinuities.records", "discontinuities.boundary_values",
         "discontinuities.previous_boundary_values", "discontinuities.last_coefficients",
         "discontinuities.previous_last_coefficients", "previous.state", "previous.error", "estimate.expected",
-        "estimate.largest",
+        "estimate.largest", "estimate.noise",
     )  # fmt: skip
     error: Exception | None = None
     """What a function of the user raised, where the status is ``USER_ERROR``."""
@@ -680,23 +678,28 @@ class HBVMStepper(ABC):
             return Status.EVENT, self.search.hits.reason
         if outcome == ACCUMULATE:
             return accumulated(self.t)
-        added = self._added_by_noise() if outcome in (DIVERGED, SCATTERED) else 0.0
-        if added > LEAST_NOISE:
-            return noisy(self.t, self._context.h, added)
+        if outcome in (DIVERGED, SCATTERED):
+            noise, last = self._noise(), self._context.solver.last
+            if last <= EXPLAINED * noise.added(self._context.h):
+                return noise.ends(self.t, self._context.h)
         return failure(outcome, self._program, (self._context, self._partial), self.t, self._solver)
 
-    def _added_by_noise(self) -> float:
-        """Return what noise of a field that is called adds in the step, relative to the size of the state."""
-        system, y, values = self._program.system, self.y, np.empty(self._dim)
-        if not isinstance(system, Opaque) or not y.any():
-            return 0.0
+    def _noise(self) -> Noise:
+        """Return the noise of a field that is called, at the present state."""
+        ctx, system, values = self._context, self._program.system, np.empty(self._dim)
 
-        def field(y: Array) -> Array:
-            system.evaluate(self.t, y, self.par, values)
+        def field(t: float, y: Array) -> Array:
+            try:
+                system.evaluate(t, y, ctx.par, values)
+            except Exception:  # beside the trajectory the function may not be defined
+                values[:] = np.nan
+            ctx.counters.evaluations += 1
             return values.copy()
 
+        if system.traced:
+            return Noise(0.0 * self.y, 0.0 * self.y, self.y)
         with np.errstate(all="ignore"):
-            return abs(self._context.h) * field_noise(field, y).max() / np.abs(y).max()
+            return Noise(field_noise(field, self.t, ctx.h, self.y), field(self.t, self.y), self.y)
 
 
 def accumulated(t: float) -> tuple[Status, str]:

@@ -21,7 +21,7 @@ from integrators.kernel.context import (
     UNSCALED,
     Context,
 )
-from integrators.kernel.noise import noisy
+from integrators.kernel.noise import Noise
 from integrators.kernel.parts.discontinuities import MOST_RECORDED, NOTHING, START
 from integrators.kernel.step.rule import FIRST_AT_REST, RESTART, SCALE_LASTS
 from integrators.kernel.stepper import Ended, HBVMStepper, Program
@@ -33,6 +33,7 @@ from integrators.running.watchdog import stall_detector
 LATEST = sys.float_info.max  # a time beyond all
 LOOK_AHEAD = 2000  # steps of the look ahead, at most
 MOST_COMPARED = 20000  # of each of the trajectories that tell how errors grow: longer ones tell nothing
+LOOK_AGAIN = 4  # times as many steps that were rejected or shortened, and noise is looked for again
 LARGER = 1e3  # times as large as a block is, at least, what it will reach is worth knowing
 NOISE = 1e-12  # part of what it will reach, for what its growth leaves, that a field's rounding may come to
 
@@ -67,6 +68,8 @@ class AdaptiveStepper(HBVMStepper):
         self._max_steps = program.max_steps
         self._origin = self._goal = t0
         self._in_vain = 1
+        self._known: Noise | None = None
+        self._known_at = -1
         self._begins = self._breakpoints.any
         super().__init__(program, y, par, t0)
 
@@ -225,9 +228,38 @@ class AdaptiveStepper(HBVMStepper):
         if self._breakpoints is not breakpoints:  # an event has moved them
             self._begin_at_breakpoint()
             return ANEW if outcome == BUDGET else outcome
+        if outcome == NOISY:
+            return self._look_for_noise()
         if outcome != UNSCALED:
             return outcome
         self._look_ahead()
+        return BUDGET
+
+    def _look_for_noise(self) -> int:
+        """Measure the noise of a field that is called, which may be what keeps steps short; the outcome.
+
+        The run is over where it is known, from here, and more than the tolerance allows.
+        """
+        ctx, shape = self._context, self._program.shape
+        estimate = ctx.estimate
+        if self._known_at == ctx.counters.steps and estimate.noisy:
+            return NOISY
+        self._known = known = self._noise()
+        self._known_at = ctx.counters.steps
+        estimate.next_look = LOOK_AGAIN * estimate.troubles
+        if not known.values.any():
+            estimate.noisy = 0
+            return BUDGET
+        rows, blocks = slice(-shape.rows, None), ctx.blocks
+        estimate.noise[:] = 0.0
+        np.maximum.at(estimate.noise, shape.block, known.values[rows] / math.sqrt(self._program.constants.k))
+        moved = np.maximum(np.abs(self.y), abs(ctx.h) * np.abs(known.slope))[rows]
+        np.maximum.at(estimate.largest, shape.group[shape.block], moved * blocks.speed[shape.block])
+        estimate.spacing = math.sqrt(known.relative)
+        if not estimate.noisy:  # it was noise that looked like some, and the length was not to blame
+            ctx.discontinuities.count = 0
+            ctx.controller.next_length, ctx.controller.length_limit = ctx.h, math.inf
+        estimate.noisy = 1
         return BUDGET
 
     def _look_ahead(self) -> None:
@@ -418,7 +450,8 @@ class AdaptiveStepper(HBVMStepper):
                 "the solution may end or be singular here."
             )
         if outcome == NOISY:
-            return noisy(self.t, self._context.h, self._context.estimate.added)
+            assert self._known is not None
+            return self._known.ends(self.t, self._context.h)
         if outcome == SLIDING:
             return Status.SLIDING, (
                 f"on both sides of the switching surface that is reached at t = {self.t!r} the field points "

@@ -44,7 +44,7 @@ def differences(ctx, m, t):
             size = max(abs(m.state[d]), SMALL * largest)
             if ctx.second == 0:
                 size = max(size, min(h * abs(m.slopes[d]), largest))
-            moved = m.state[d] + STEP * (size if size > 0.0 else 1.0)
+            moved = m.state[d] + max(STEP, ctx.estimate.spacing) * (size if size > 0.0 else 1.0)
             stages[lanes * d + l] = moved
         call_field(ctx.field, times, stages, par, values)
         for i in range(m.column_starts[first], m.column_starts[first + count]):

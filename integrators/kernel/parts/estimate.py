@@ -23,10 +23,13 @@ class Estimate(Part):
     steepest = Array("blocks.count")  # and slope
     noise = Array("blocks.count")  # coefficients that rounding explains; see `step.rounding`
     largest = Array("blocks.groups")  # the largest size, as a velocity, that a block of each group has had
-    added = Real()  # what noise adds in a step that it has kept from being solved, relative
     line = Real()  # part of a step on which noise is measured; 0: it is not
-    # 1: the field is a function that is called, and may have more noise than rounding makes in a formula
+    # 1: the field is a function that is called, and may have more noise than rounding makes in a formula.
     called = Integer()
+    noisy = Integer()  # 1: it has, and that is in `noise`
+    troubles = Integer()  # steps that were rejected or shortened,
+    next_look = Integer()  # and how many of them there are when noise is looked for again
+    spacing = Real()  # of differences beside a component, relative, where that is noise
     measured = Integer()  # 1: noise was measured in the step that was estimated
     evident_error = Real()  # the estimated errors, of what is more than rounding in any field
     evident_quadrature_error = Real()

@@ -306,7 +306,7 @@ def confirm_previous_step(ctx):
     call_field(ctx.field, times, stages, ctx.par, values)
     ctx.counters.evaluations += 1
     ctx.discontinuities.boundary = SEEN
-    ctx.estimate.measured = 0
+    ctx.estimate.measured = ctx.estimate.noisy
     if differs_behind(ctx):
         measure_noise_behind(ctx)
         if differs_behind(ctx):

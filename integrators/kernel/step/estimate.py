@@ -251,7 +251,7 @@ def estimate(ctx):
     """
     note_sizes(ctx)
     take_coefficients(ctx)
-    ctx.estimate.measured = 0
+    ctx.estimate.measured = ctx.estimate.noisy
     error, quadrature_error = judge_blocks(ctx)
     if (ctx.discontinuities.not_smooth or fails(ctx, error, quadrature_error)) and not fails(
         ctx, ctx.estimate.evident_error, ctx.estimate.evident_quadrature_error

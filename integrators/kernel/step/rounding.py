@@ -13,7 +13,6 @@ from integrators.kernel.native.jit import compiled, for_both_widths
 from integrators.kernel.parts.estimate import AFTER_MIDDLE, BEFORE_LAST, LAST, MIDDLE
 from integrators.kernel.simd.memory import get, put, splat8, total
 from integrators.kernel.simd.operations import greatest, size, where
-from integrators.kernel.step.begin import start_plain
 from integrators.kernel.step.coefficients import coefficient
 from integrators.kernel.step.control import INFINITY
 from integrators.kernel.step.fixed_point import evaluate
@@ -32,10 +31,6 @@ LEAST_WAY = 2.0**-46
 # Part of its size by which a component's stages are unlike those of any smooth line: they are rounded.
 UNIT = 2.0**-52
 GOLDEN = 0.618  # multiples of it, but for their integers, are in no order
-# Noise of the field itself is as large, within a factor, on a line that is a part as long, and with stages
-# that are so many units from it. That of a structure in the field is not on the one, that of a steep field's
-# stages not with the others.
-SHORTER, UNITS, AS_LARGE = 2.0**-6, 64.0, 8.0
 
 
 @for_both_widths
@@ -66,9 +61,10 @@ def known_noise(ctx, d):
 
 @compiled
 def known_rounding(ctx, d):
-    """As `known_noise`, of no more than rounding adds in a step that can be solved."""
+    """As `known_noise`: in a formula, of no more than rounding adds in a step that can be solved."""
     noise = known_noise(ctx, d)
-    return noise if abs(ctx.h) * noise <= EVIDENT * largest_in_group(ctx, ctx.blocks.of_row[d]) else 0.0
+    rounding = EVIDENT * largest_in_group(ctx, ctx.blocks.of_row[d])
+    return noise if ctx.estimate.noisy or abs(ctx.h) * noise <= rounding else 0.0
 
 
 @compiled
@@ -77,17 +73,21 @@ def measure_noise(ctx):
 
     A discontinuity is on one of them at most.
     """
-    if ctx.estimate.line > 0.0:
-        measure_on_both_lines(ctx, ctx.estimate.line, 1.0, ctx.estimate.noise)
+    noise, other, part = ctx.estimate.noise, ctx.estimate.slow_decay, ctx.estimate.line
+    if part > 0.0:
+        measure_on_line(ctx, ctx.state, ctx.next_state, 0.0, ctx.h, part, noise)
+        measure_on_line(ctx, ctx.next_state, ctx.state, ctx.h, -ctx.h, part, other)
+        for b in range(ctx.blocks.count):
+            noise[b] = min(noise[b], other[b])
         ctx.estimate.measured = 1
 
 
 @compiled
 def measure_noise_behind(ctx):
     """As `measure_noise`, on a line from the state towards the start of the previous step."""
-    if ctx.estimate.line > 0.0:
+    if ctx.estimate.line > 0.0 and not ctx.estimate.measured:
         h, part = ctx.controller.previous_length, ctx.estimate.line
-        measure_on_line(ctx, ctx.state, ctx.previous.state, 0.0, -h, part, 1.0, ctx.estimate.noise)
+        measure_on_line(ctx, ctx.state, ctx.previous.state, 0.0, -h, part, ctx.estimate.noise)
         ctx.estimate.measured = 1
 
 
@@ -95,43 +95,6 @@ def measure_noise_behind(ctx):
 def largest_in_group(ctx, b):
     """Return the largest size that a block of the group of block b has had, for the mass of that."""
     return ctx.estimate.largest[ctx.blocks.group[b]] * ctx.blocks.mass[b]
-
-
-@compiled
-def measure_on_both_lines(ctx, part, units, noise):
-    """Set what is measured of each block on lines from both ends of the solved step, the smaller of the two.
-
-    Parameters
-    ----------
-    part, units : float
-        See `measure_on_line`.
-    noise : array
-        Of all blocks. `Estimate.slow_decay` is not kept.
-    """
-    other = ctx.estimate.slow_decay
-    measure_on_line(ctx, ctx.state, ctx.next_state, 0.0, ctx.h, part, units, noise)
-    measure_on_line(ctx, ctx.next_state, ctx.state, ctx.h, -ctx.h, part, units, other)
-    for b in range(ctx.blocks.count):
-        noise[b] = min(noise[b], other[b])
-
-
-@compiled
-def added_by_noise(ctx, least):
-    """Return what the field's own noise adds in the attempted step: the largest part of a size in a group.
-
-    That step has an end, which may be inaccurate. What is not more than ``least`` may be any noise.
-    """
-    noise, again, part = ctx.estimate.noise, ctx.estimate.gamma_error, ctx.estimate.line
-    measure_on_both_lines(ctx, part, 1.0, noise)
-    ctx.estimate.measured = 0
-    added = largest_added(ctx)
-    if added <= least:
-        return added
-    measure_on_both_lines(ctx, SHORTER * part, UNITS, again)
-    for b in range(ctx.blocks.count):
-        if not (noise[b] <= AS_LARGE * again[b] and again[b] <= AS_LARGE * noise[b]):
-            noise[b] = 0.0
-    return largest_added(ctx)
 
 
 @compiled
@@ -147,20 +110,6 @@ def largest_added(ctx):
         if largest > 0.0:
             most = max(most, abs(ctx.h) * estimate.noise[b] / largest)
     return most
-
-
-@compiled
-def predict_end(ctx):
-    """Set the end of the attempted step, which has failed, from the field at its start."""
-    start_plain(ctx)
-    evaluate(ctx)
-    for d in range(ctx.rows):
-        if ctx.second:
-            i = 8 * (d // 4) + d % 4
-            ctx.next_state[i + 4] = ctx.state[i + 4] + ctx.h * ctx.factors.velocity[d] * ctx.state[i]
-        else:
-            ctx.next_state[d] = ctx.state[d] + ctx.h * ctx.values[ctx.lanes * d]
-    note_sizes(ctx)
 
 
 @compiled
@@ -181,7 +130,7 @@ def momentum(ctx, d):
 
 
 @compiled
-def measure_on_line(ctx, state, end, start, h, part, units, noise):
+def measure_on_line(ctx, state, end, start, h, part, noise):
     """Set the largest coefficient of high degree of each block, on a line from ``state`` towards ``end``.
 
     Parameters
@@ -192,9 +141,8 @@ def measure_on_line(ctx, state, end, start, h, part, units, noise):
     start, h : float
         ... at this time after that of the step, and h later.
     part : float
-        The line is this part of the way between them.
-    units : float
-        Its points are beside it by so many times what the stages of a solved step may be.
+        The line is this part of the way between them. Its points are beside it by what the stages of a
+        solved step may be.
     noise : array
         The coefficients, for all blocks.
     """
@@ -211,7 +159,7 @@ def measure_on_line(ctx, state, end, start, h, part, units, noise):
         j = 8 * (d // 4) + 4 + d % 4 if ctx.second else d
         if state[j] == 0.0 and end[j] == 0.0:
             continue  # what stays 0 is not rounded: the field may not be defined, or another one, beside it
-        left = units * UNIT / ctx.blocks.weights[d]
+        left = UNIT / ctx.blocks.weights[d]
         for i in range(ctx.k):
             above = GOLDEN * (i + 1) * (d + 1) % 1.0 < 0.5
             scratch.old_stages[offset(ctx, i // 8) + lanes * d + i % 8] += left if above else -left

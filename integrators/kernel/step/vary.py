@@ -57,7 +57,7 @@ from integrators.kernel.step.fixed_point import iterate_measured
 from integrators.kernel.step.graze import grazes
 from integrators.kernel.step.iterate import end_iteration, extra_iterations, iterate_to_end, test
 from integrators.kernel.step.reversible import keep_pace
-from integrators.kernel.step.rounding import EVIDENT, added_by_noise, predict_end
+from integrators.kernel.step.rounding import EVIDENT, largest_added
 from integrators.kernel.step.rule import (
     FARTHEST,
     FIRST_RATE,
@@ -99,7 +99,6 @@ STALL_PART = 1e-4
 STALL_CHECK_EVERY, STALL_CHECKS = 256, 32
 # What noise adds in a step, relative: the iteration stagnates at so many times as much.
 NOISE_MARGIN = 10.0
-LOOK_FOR_NOISE = 2  # rejections in a row at which noise is looked for: smooth steps seldom have so many
 
 
 @compiled
@@ -314,7 +313,8 @@ def solve_adaptive(ctx):
         if outcome == NOT_KEPT:
             return outcome
         accepted = accepts(ctx, outcome, ctx.counters.iterations - before, implicit)
-        if is_noisy(ctx, outcome, implicit, accepted):
+        if may_be_noise(ctx, accepted):
+            ctx.length = 0.0
             return NOISY
         if accepted:
             ctx.solved = BY_VALUES
@@ -326,38 +326,25 @@ def solve_adaptive(ctx):
 
 
 @compiled
-def is_noisy(ctx, outcome, implicit, accepted):
-    """Whether the field's own noise adds more in the attempted step than rounding would, and than is allowed.
+def may_be_noise(ctx, accepted):
+    """Whether to come back for the noise of a field that is called: it may be what keeps steps short.
 
-    Shorter steps have more of it. Of noise that is less the iteration need not leave less. It is measured
-    where a step is not solved, where one that was shortened still takes many iterations, and where one is
-    rejected for the second time for its errors. (The implicit solver damps noise.)
+    Or, where it is known, it adds more in the attempted step than the tolerance allows. Of what it adds
+    the iteration need not leave less.
     """
-    solver, controller = ctx.solver, ctx.controller
-    if ctx.estimate.called == 0 or not ctx.estimate.line > 0.0:
+    estimate, solver, controller = ctx.estimate, ctx.solver, ctx.controller
+    if estimate.called == 0:
         return False
-    if outcome in (DIVERGED, SCATTERED):
-        predict_end(ctx)
-    elif outcome != DONE or implicit:
+    if estimate.noisy:
+        added = largest_added(ctx)
+        if added > max(EVIDENT, controller.allowed_error / NOISE_MARGIN):
+            return True
+        if NOISE_MARGIN * added > solver.stagnation:
+            iterate_to(solver, NOISE_MARGIN * added)
+    if accepted and abs(ctx.h) > SAFETY * abs(controller.previous_length):
         return False
-    elif accepted:
-        shortened = abs(ctx.h) <= SAFETY * abs(controller.previous_length)
-        if solver.tried <= TARGET_ITERATIONS or not shortened:
-            return False
-    elif controller.attempts != LOOK_FOR_NOISE:
-        return False
-    ctx.estimate.added = added = added_by_noise(ctx, solver.stagnation / NOISE_MARGIN)
-    if added > max(EVIDENT, controller.allowed_error / NOISE_MARGIN):
-        ctx.discontinuities.count = 0  # it was noise that looked like some
-        return True
-    if NOISE_MARGIN * added > solver.stagnation:
-        iterate_to(solver, NOISE_MARGIN * added)
-        controller.length_limit = INFINITY  # the length was not to blame
-        if accepted:
-            controller.length_after = ctx.h
-        else:
-            controller.next_length = ctx.h
-    return False
+    estimate.troubles += 1
+    return estimate.troubles >= estimate.next_look
 
 
 @compiled
