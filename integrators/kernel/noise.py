@@ -9,12 +9,12 @@ import numpy as np
 from integrators.kernel.step.rule import FLOOR, SMALLEST
 from integrators.protocol import Array, Status
 
-POINTS = 16
+POINTS, FEWEST = 16, 4  # values on a line, and how many of their differences must not be 0
 # Of the state's size, the lengths of the lines: on the first there are a few thousand doubles, the last is
 # for values that are rounded to one digit.
-FIRST, LONGER, LONGEST = 2.0**-40, 2.0**10, 1.0
+FIRST, LONGER, LONGEST = 2.0**-40, 2.0**8, 1.0
 GOLDEN = 0.618  # multiples of it, but for their integers, are in no order
-FLAT = 0.25  # coefficients of high degree that are at least this part of the middle ones do not fall off
+FLAT = 0.1  # coefficients of high degree that are at least this part of the middle ones do not fall off
 UNIT, BEYOND_ROUNDING = 2.0**-52, 100.0
 MARGIN = 30.0  # times what noise adds while the state changes by its size is a tolerance that can be had
 MOST = 0.1  # a looser tolerance is no advice
@@ -62,7 +62,7 @@ def _on_line(field: Callable[[float, Array], Array], t: float, h: float, y: Arra
     length = FIRST
     while np.isnan(noise).any() and length <= LONGEST:
         values = np.array([field(t + length * x * h, y + length * x * away) for x in _X])
-        known = np.count_nonzero(np.diff(values, axis=0), axis=0) >= POINTS // 2
+        known = np.count_nonzero(np.diff(values, axis=0), axis=0) >= FEWEST
         found = np.where(known, _on_one_length(values, length), np.nan)
         noise = np.where(np.isnan(noise), found, noise)
         length *= LONGER

@@ -42,6 +42,7 @@ from integrators.kernel.pace import FEWEST, Pace
 from integrators.kernel.parts.implicit import ALWAYS_IMPLICIT, AUTO, FOR_VECTORS, NOT_WANTED
 from integrators.kernel.searches import LastingSearch
 from integrators.kernel.spare import Pair, Spare
+from integrators.kernel.step.rule import STAGNATION
 from integrators.kernel.tables import Constants
 from integrators.kernel.tangent.frames import Frames
 from integrators.kernel.tangent.group import Directions
@@ -71,7 +72,9 @@ SHORTEST_TIME = 64  # units in the last place: nothing happens in a time as shor
 FROM_UNDEFINED = (Status.NOT_FINITE, Status.STEP_UNDERFLOW, Status.NONLINEAR_DIVERGENCE)
 FIRST_HELD = 16  # steps for which the implicit solver stays at work when it is made; `solve` has more
 
-EXPLAINED = 100.0  # times what noise adds in a step: more may an iteration not leave for its sake
+# Changes that noise makes in a step, relative: an iteration stagnates at ten times as much, and is over at
+# `step.rule.STAGNATION`.
+LEAST_NOISE = 0.1 * STAGNATION
 
 Ended = tuple[Status, str]  # how a run is over before its end, and the reason as a sentence
 Filled = tuple[Array, int, Ended | None]  # samples, how the kernel came back, and why they are the last
@@ -678,10 +681,8 @@ class HBVMStepper(ABC):
             return Status.EVENT, self.search.hits.reason
         if outcome == ACCUMULATE:
             return accumulated(self.t)
-        if outcome in (DIVERGED, SCATTERED):
-            noise, last = self._noise(), self._context.solver.last
-            if last <= EXPLAINED * noise.added(self._context.h):
-                return noise.ends(self.t, self._context.h)
+        if outcome in (DIVERGED, SCATTERED) and (noise := self._noise()).added(self._context.h) > LEAST_NOISE:
+            return noise.ends(self.t, self._context.h)
         return failure(outcome, self._program, (self._context, self._partial), self.t, self._solver)
 
     def _noise(self) -> Noise:

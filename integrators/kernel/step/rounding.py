@@ -113,6 +113,16 @@ def largest_added(ctx):
 
 
 @compiled
+def change_by_noise(ctx):
+    """Return the change that `Estimate.noise` makes of the stages, relative, small blocks raised."""
+    most = 0.0
+    for d in range(ctx.rows):
+        noise = ctx.estimate.noise[ctx.blocks.of_row[d]]
+        most = max(most, abs(ctx.h) * noise * ctx.blocks.floored_weights[d])
+    return most
+
+
+@compiled
 def note_sizes(ctx):
     """Let the largest sizes of the groups be at least those of the present state."""
     blocks, largest = ctx.blocks, ctx.estimate.largest

@@ -57,13 +57,18 @@ from integrators.kernel.step.fixed_point import iterate_measured
 from integrators.kernel.step.graze import grazes
 from integrators.kernel.step.iterate import end_iteration, extra_iterations, iterate_to_end, test
 from integrators.kernel.step.reversible import keep_pace
-from integrators.kernel.step.rounding import EVIDENT, largest_added
+from integrators.kernel.step.rounding import EVIDENT, change_by_noise, largest_added
 from integrators.kernel.step.rule import (
     FARTHEST,
     FIRST_RATE,
+    LOG_RESIDUAL_VARYING,
     ROUNDING,
     SCALE_LASTS,
     SHORTEST_PART,
+    STAGNATION,
+    TOLERANCE,
+    TRUSTED,
+    UNTESTED,
 )
 from integrators.kernel.step.solver_switch import request_solver, solve_implicitly
 from integrators.kernel.step.stopping import rate_at_zero, rate_since, takes_too_long, untested
@@ -332,15 +337,13 @@ def may_be_noise(ctx, accepted):
     Or, where it is known, it adds more in the attempted step than the tolerance allows. Of what it adds
     the iteration need not leave less.
     """
-    estimate, solver, controller = ctx.estimate, ctx.solver, ctx.controller
+    estimate, controller = ctx.estimate, ctx.controller
     if estimate.called == 0:
         return False
     if estimate.noisy:
-        added = largest_added(ctx)
-        if added > max(EVIDENT, controller.allowed_error / NOISE_MARGIN):
+        if largest_added(ctx) > max(EVIDENT, controller.allowed_error / NOISE_MARGIN):
             return True
-        if NOISE_MARGIN * added > solver.stagnation:
-            iterate_to(solver, NOISE_MARGIN * added)
+        iterate_to(ctx.solver, NOISE_MARGIN * change_by_noise(ctx))
     if accepted and abs(ctx.h) > SAFETY * abs(controller.previous_length):
         return False
     estimate.troubles += 1
@@ -350,9 +353,10 @@ def may_be_noise(ctx, accepted):
 @compiled
 def iterate_to(solver, change):
     """Let the iterations from now on leave such changes, which are noise."""
-    solver.stagnation = solver.tolerance = change
-    solver.log_residual = solver.log_trusted = binary_log(change)
-    solver.trusted = max(solver.trusted, change)
+    solver.stagnation, solver.tolerance = max(STAGNATION, change), max(TOLERANCE, change)
+    solver.trusted = max(TRUSTED * TOLERANCE, change)
+    solver.log_trusted = binary_log(max(UNTESTED * TOLERANCE, change))
+    solver.log_residual = max(LOG_RESIDUAL_VARYING, binary_log(solver.tolerance))
 
 
 @compiled
