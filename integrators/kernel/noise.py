@@ -43,7 +43,7 @@ def field_noise(field: Callable[[float, Array], Array], t: float, h: float, y: A
     t, h : float
         The lines are in the step from t of length h.
     y : array, shape (dim,)
-        What is exactly 0 stays 0: the field may not be defined, or another one, beside it.
+        What stays 0 in that step stays 0: the field may not be defined, or another one, beside it.
 
     Returns
     -------
@@ -52,7 +52,8 @@ def field_noise(field: Callable[[float, Array], Array], t: float, h: float, y: A
         finite.
     """
     order = GOLDEN * np.arange(1, len(y) + 1) % 1.0
-    away = (0.5 + order) * np.where(order * 64.0 % 2.0 < 1.0, 1.0, -1.0) * y  # terms do not cancel on all
+    away = np.where(order * 64.0 % 2.0 < 1.0, 0.5, -0.5) * (1.0 + order)  # so that terms do not cancel
+    away *= np.where(y != 0.0, y, h * field(t, y))
     return np.minimum(*(_on_line(field, t, h, y, side * away) for side in (1.0, -1.0)))
 
 

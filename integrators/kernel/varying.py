@@ -23,6 +23,7 @@ from integrators.kernel.context import (
 )
 from integrators.kernel.noise import Noise
 from integrators.kernel.parts.discontinuities import MOST_RECORDED, NOTHING, START
+from integrators.kernel.parts.estimate import TOO_NOISY
 from integrators.kernel.step.rule import FIRST_AT_REST, RESTART, SCALE_LASTS
 from integrators.kernel.stepper import Ended, HBVMStepper, Program
 from integrators.options import SHORTEST, SMALLEST
@@ -33,7 +34,7 @@ from integrators.running.watchdog import stall_detector
 LATEST = sys.float_info.max  # a time beyond all
 LOOK_AHEAD = 2000  # steps of the look ahead, at most
 MOST_COMPARED = 20000  # of each of the trajectories that tell how errors grow: longer ones tell nothing
-LOOK_AGAIN = 4  # times as many steps that were rejected or shortened, and noise is looked for again
+LOOK_AGAIN = 2  # times as many steps that were rejected or shortened, and noise is looked for again
 LARGER = 1e3  # times as large as a block is, at least, what it will reach is worth knowing
 NOISE = 1e-12  # part of what it will reach, for what its growth leaves, that a field's rounding may come to
 
@@ -242,7 +243,7 @@ class AdaptiveStepper(HBVMStepper):
         """
         ctx, shape = self._context, self._program.shape
         estimate = ctx.estimate
-        if self._known_at == ctx.counters.steps and estimate.noisy:
+        if estimate.noisy == TOO_NOISY and self._known_at == ctx.counters.steps:
             return NOISY
         self._known = known = self._noise()
         self._known_at = ctx.counters.steps

@@ -8,6 +8,8 @@ from integrators.kernel.native.memory import Array, Integer, Part, Real
 GAMMA_0, GAMMA_1, GAMMA_2, GAMMA_3, BEFORE_ERROR, AT_ERROR, BEFORE_LAST, LAST = range(8)
 MIDDLE, AFTER_MIDDLE, AT_START, AT_END = range(8, 12)
 
+TOO_NOISY = 2
+
 
 class Estimate(Part):
     """The estimated errors of a step, block by block; see `step.estimate`."""
@@ -26,7 +28,7 @@ class Estimate(Part):
     line = Real()  # part of a step on which noise is measured; 0: it is not
     # 1: the field is a function that is called, and may have more noise than rounding makes in a formula.
     called = Integer()
-    noisy = Integer()  # 1: it has, and that is in `noise`
+    noisy = Integer()  # 1: it has, and that is in `noise`; TOO_NOISY: more than the tolerance allows
     troubles = Integer()  # steps that were rejected or shortened,
     next_look = Integer()  # and how many of them there are when noise is looked for again
     spacing = Real()  # of differences beside a component, relative, where that is noise

@@ -20,6 +20,7 @@ from integrators.kernel.context import (
 )
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.parts.discontinuities import NOTHING, START
+from integrators.kernel.parts.estimate import TOO_NOISY
 from integrators.kernel.parts.implicit import FIXED_POINT
 from integrators.kernel.parts.surfaces import AT_STEP_END, END_ACROSS, NO_SURFACE
 from integrators.kernel.simd.operations import binary_log, least
@@ -102,14 +103,16 @@ MOST_ATTEMPTS = 24
 # than such a part of the interval.
 STALL_PART = 1e-4
 STALL_CHECK_EVERY, STALL_CHECKS = 256, 32
-# What noise adds in a step, relative: the iteration stagnates at so many times as much.
-NOISE_MARGIN = 10.0
+# What noise adds in a step may be this part of the tolerance; the iteration stagnates at so many times that.
+NOISE_ALLOWED, NOISE_LEFT = 0.1, 20.0
 
 
 @compiled
 def attempt(ctx, h):
     """Solve the step of length h from the state; return the outcome."""
     set_step(ctx, h)
+    if ctx.estimate.noisy:
+        iterate_to(ctx.solver, NOISE_LEFT * change_by_noise(ctx))
     if ctx.implicit.active:
         ctx.solver.rate = FIRST_RATE  # it is unknown afterwards
         outcome = solve_implicitly(ctx, ctx, 0)
@@ -334,16 +337,15 @@ def solve_adaptive(ctx):
 def may_be_noise(ctx, accepted):
     """Whether to come back for the noise of a field that is called: it may be what keeps steps short.
 
-    Or, where it is known, it adds more in the attempted step than the tolerance allows. Of what it adds
-    the iteration need not leave less.
+    Or, where it is known, it adds more in the attempted step than the tolerance allows.
     """
     estimate, controller = ctx.estimate, ctx.controller
     if estimate.called == 0:
         return False
     if estimate.noisy:
-        if largest_added(ctx) > max(EVIDENT, controller.allowed_error / NOISE_MARGIN):
+        if largest_added(ctx) > max(EVIDENT, NOISE_ALLOWED * controller.allowed_error):
+            estimate.noisy = TOO_NOISY
             return True
-        iterate_to(ctx.solver, NOISE_MARGIN * change_by_noise(ctx))
     if accepted and abs(ctx.h) > SAFETY * abs(controller.previous_length):
         return False
     estimate.troubles += 1
