@@ -1,7 +1,7 @@
 """The noise of a field that is called, and the sentence that ends a run by it."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,9 +10,11 @@ from integrators.kernel.step.rule import FLOOR, SMALLEST
 from integrators.protocol import Array, Status
 
 POINTS, FEWEST = 16, 4  # values on a line, and how many of their differences must not be 0
-# Of the state's size, the lengths of the lines: on the first there are a few thousand doubles, the last is
-# for values that are rounded to one digit.
-FIRST, LONGER, LONGEST = 2.0**-40, 2.0**8, 1.0
+# Of the state's size, the lengths of the lines: on the first there are sixteen thousand doubles, on the last
+# a field that is rounded to two digits changes. One with fewer steps than that has discontinuities, which
+# adaptive steps end at; where a step has failed, they are its noise.
+LENGTHS = (2.0**-38, 2.0**-29, 2.0**-20, 2.0**-11, 2.0**-2)
+ALL_LENGTHS = (*LENGTHS, 1.0)
 GOLDEN = 0.618  # multiples of it, but for their integers, are in no order
 FLAT = 0.1  # coefficients of high degree that are at least this part of the middle ones do not fall off
 UNIT, BEYOND_ROUNDING = 2.0**-52, 100.0
@@ -26,12 +28,14 @@ _COEFFICIENTS = np.cos(np.pi * np.outer(np.arange(POINTS), np.arange(POINTS) + 0
 )
 
 
-def field_noise(field: Callable[[float, Array], Array], t: float, h: float, y: Array) -> Array:
+def field_noise(
+    field: Callable[[float, Array], Array], t: float, h: float, y: Array, lengths: Sequence[float]
+) -> Array:
     """Return the standard deviation of the noise of a field near a state, for each component.
 
     By the idea of J. J. More and S. M. Wild, "Estimating computational noise", SIAM J. Sci. Comput. 33 (2011)
     1292-1314: on so short a line a smooth field is a polynomial of low degree, and what is found of high
-    degrees is noise, of the same size in all of them. As there, the line is longer where half of the values
+    degrees is noise, of the same size in all of them. As there, the line is longer where most values
     on it are equal, those of a field that is rounded. Coefficients take the place of differences, since those
     of rounded values at equal distances may vanish. The least is taken of two lines that begin at the
     state in opposite directions: a discontinuity is on one of them.
@@ -44,6 +48,9 @@ def field_noise(field: Callable[[float, Array], Array], t: float, h: float, y: A
         The lines are in the step from t of length h.
     y : array, shape (dim,)
         What stays 0 in that step stays 0: the field may not be defined, or another one, beside it.
+    lengths : sequence of float
+        Of the lines, relative to the state, ascending; a longer one is taken where a component has fewer than
+        `FEWEST` steps on those before.
 
     Returns
     -------
@@ -54,19 +61,26 @@ def field_noise(field: Callable[[float, Array], Array], t: float, h: float, y: A
     order = GOLDEN * np.arange(1, len(y) + 1) % 1.0
     away = np.where(order * 64.0 % 2.0 < 1.0, 0.5, -0.5) * (1.0 + order)  # so that terms do not cancel
     away *= np.where(y != 0.0, y, h * field(t, y))
-    return np.minimum(*(_on_line(field, t, h, y, side * away) for side in (1.0, -1.0)))
+    return np.minimum(*(_on_line(field, t, h, y, side * away, lengths) for side in (1.0, -1.0)))
 
 
-def _on_line(field: Callable[[float, Array], Array], t: float, h: float, y: Array, away: Array) -> Array:
+def _on_line(
+    field: Callable[[float, Array], Array],
+    t: float,
+    h: float,
+    y: Array,
+    away: Array,
+    lengths: Sequence[float],
+) -> Array:
     """Return the same from lines in one direction."""
     noise = np.full(len(y), np.nan)
-    length = FIRST
-    while np.isnan(noise).any() and length <= LONGEST:
+    for length in lengths:
         values = np.array([field(t + length * x * h, y + length * x * away) for x in _X])
-        known = np.count_nonzero(np.diff(values, axis=0), axis=0) >= FEWEST
-        found = np.where(known, _on_one_length(values, length), np.nan)
+        steps = np.count_nonzero(np.diff(values, axis=0), axis=0)
+        found = np.where(steps >= FEWEST, _on_one_length(values, length), np.nan)
         noise = np.where(np.isnan(noise), found, noise)
-        length *= LONGER
+        if not np.isnan(noise).any():
+            break
     return np.nan_to_num(noise)
 
 

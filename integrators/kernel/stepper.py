@@ -37,7 +37,7 @@ from integrators.kernel.implicit.workspace import Solver, Workspace, report
 from integrators.kernel.line.kept import Kept
 from integrators.kernel.native import binary
 from integrators.kernel.native.memory import address
-from integrators.kernel.noise import Noise, field_noise
+from integrators.kernel.noise import ALL_LENGTHS, Noise, field_noise
 from integrators.kernel.pace import FEWEST, Pace
 from integrators.kernel.parts.implicit import ALWAYS_IMPLICIT, AUTO, FOR_VECTORS, NOT_WANTED
 from integrators.kernel.searches import LastingSearch
@@ -681,11 +681,14 @@ class HBVMStepper(ABC):
             return Status.EVENT, self.search.hits.reason
         if outcome == ACCUMULATE:
             return accumulated(self.t)
-        if outcome in (DIVERGED, SCATTERED) and (noise := self._noise()).added(self._context.h) > LEAST_NOISE:
+        if (
+            outcome in (DIVERGED, SCATTERED)
+            and (noise := self._noise(ALL_LENGTHS)).added(self._context.h) > LEAST_NOISE
+        ):
             return noise.ends(self.t, self._context.h)
         return failure(outcome, self._program, (self._context, self._partial), self.t, self._solver)
 
-    def _noise(self) -> Noise:
+    def _noise(self, lengths: Sequence[float]) -> Noise:
         """Return the noise of a field that is called, at the present state."""
         ctx, system, values = self._context, self._program.system, np.empty(self._dim)
 
@@ -700,7 +703,7 @@ class HBVMStepper(ABC):
         if system.traced:
             return Noise(0.0 * self.y, 0.0 * self.y, self.y)
         with np.errstate(all="ignore"):
-            return Noise(field_noise(field, self.t, ctx.h, self.y), field(self.t, self.y), self.y)
+            return Noise(field_noise(field, self.t, ctx.h, self.y, lengths), field(self.t, self.y), self.y)
 
 
 def accumulated(t: float) -> tuple[Status, str]:

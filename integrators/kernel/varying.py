@@ -21,7 +21,7 @@ from integrators.kernel.context import (
     UNSCALED,
     Context,
 )
-from integrators.kernel.noise import Noise
+from integrators.kernel.noise import LENGTHS, Noise
 from integrators.kernel.parts.discontinuities import MOST_RECORDED, NOTHING, START
 from integrators.kernel.parts.estimate import TOO_NOISY
 from integrators.kernel.step.rule import FIRST_AT_REST, RESTART, SCALE_LASTS
@@ -245,7 +245,7 @@ class AdaptiveStepper(HBVMStepper):
         estimate = ctx.estimate
         if estimate.noisy == TOO_NOISY and self._known_at == ctx.counters.steps:
             return NOISY
-        self._known = known = self._noise()
+        self._known = known = self._noise(LENGTHS)
         self._known_at = ctx.counters.steps
         estimate.next_look = LOOK_AGAIN * estimate.troubles
         if not known.values.any():

@@ -1,5 +1,6 @@
 """Random smooth systems, methods and noise: what runs must do with a field that is not smooth to rounding."""
 
+import re
 import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -118,6 +119,33 @@ def cases(first: int, count: int) -> list[Case]:
     return made
 
 
+def smooth_problem(seed: int) -> Problem:
+    """Return a random problem without noise that looks like some: stiff, fast, far from 0, with jumps."""
+    random = np.random.default_rng(seed)
+    stiff, fast, far = (10.0 ** random.uniform(*powers) for powers in ((-3, 6), (-1, 3), (0, 8)))
+    turned = np.linalg.qr(random.normal(size=(5, 5)))[0]
+    linear = turned @ np.diag(-(10.0 ** random.uniform(-1, 4, 5))) @ turned.T
+    knots = np.linspace(-3.0, 3.0, int(random.integers(5, 40)))
+    levels = np.sin(2.0 * knots)
+    fields: list[tuple[Field, Sequence[float]]] = [
+        (lambda t, y: -stiff * (y - np.cos(t)), [0.3]),
+        (lambda t, y: np.array([fast * np.cos(fast * t), -y[1]]), [0.0, 1.0]),
+        (lambda t, y: np.array([y[1], -np.sin(y[0] - far)]), [far + 1.0, 0.0]),
+        (lambda t, y: linear @ y, random.normal(size=5)),
+        (lambda t, y: np.array([y[1], np.sign(np.sin(fast * t / 20.0)) - y[0]]), [0.1, 0.0]),
+        (lambda t, y: np.array([y[1], -np.sign(y[0])]), [0.3, 0.0]),
+        (lambda t, y: np.array([y[1], -np.interp(y[0], knots, levels)]), [1.0, 0.1]),
+        (lambda t, y: np.array([y[1], -levels[np.abs(knots - y[0]).argmin()]]), [1.0, 0.1]),
+        (lambda t, y: np.array([y[1], -max(0.0, y[0])]), [1.0, 0.1]),
+        (lambda t, y: np.array([y[1], 1.0 - y[1] - y[0]]), [0.0, 0.0]),
+        (lambda t, y: np.array([y[1], -stiff * (y[0] - 1.0)]), [1.001, 0.0]),
+        (lambda t, y: np.array([np.floor(10.0 * t) / 10.0 - y[0]]), [0.0]),
+        (lambda t, y: np.zeros(2), [1.0, 2.0]),
+    ]
+    field, start = fields[seed % len(fields)]
+    return Problem(Opaque(field, dim=len(start)), y0=start, t_end=3.0)
+
+
 def wrong(case: Case) -> tuple[Any, ...] | None:
     """Return what is wrong of the run of a case, if anything is."""
     usual = integrate(case.smooth(), case.method(), [END])
@@ -131,4 +159,9 @@ def wrong(case: Case) -> tuple[Any, ...] | None:
         return *known, made.stats.steps, usual.stats.steps, made.reason
     if (made.stats.evaluations or 0) > 20 * (usual.stats.evaluations or 0) + 20_000:
         return *known, "evaluations", made.stats.evaluations, usual.stats.evaluations
+    had = re.search(r"or tol=(\S+) or more", made.reason)
+    if had and case.method().tol is not None:
+        again = integrate(case.problem(), HBVM(tol=float(had[1]), max_steps=most), [END])
+        if again.status != Status.FINISHED:
+            return *known, had[0], again.reason
     return None

@@ -342,10 +342,9 @@ def may_be_noise(ctx, accepted):
     estimate, controller = ctx.estimate, ctx.controller
     if estimate.called == 0:
         return False
-    if estimate.noisy:
-        if largest_added(ctx) > max(EVIDENT, NOISE_ALLOWED * controller.allowed_error):
-            estimate.noisy = TOO_NOISY
-            return True
+    if estimate.noisy and largest_added(ctx) > max(EVIDENT, NOISE_ALLOWED * controller.allowed_error):
+        estimate.noisy = TOO_NOISY
+        return True
     if accepted and abs(ctx.h) > SAFETY * abs(controller.previous_length):
         return False
     estimate.troubles += 1
