@@ -691,6 +691,8 @@ class HBVMStepper(ABC):
     def _noise(self, lengths: Sequence[float]) -> Noise:
         """Return the noise of a field that is called, at the present state."""
         ctx, system, values = self._context, self._program.system, np.empty(self._dim)
+        if not isinstance(system, Opaque):
+            return Noise(0.0 * self.y, 0.0 * self.y, self.y)
 
         def field(t: float, y: Array) -> Array:
             try:
@@ -700,8 +702,6 @@ class HBVMStepper(ABC):
             ctx.counters.evaluations += 1
             return values.copy()
 
-        if system.traced:
-            return Noise(0.0 * self.y, 0.0 * self.y, self.y)
         with np.errstate(all="ignore"):
             return Noise(field_noise(field, self.t, ctx.h, self.y, lengths), field(self.t, self.y), self.y)
 

@@ -241,8 +241,8 @@ class AdaptiveStepper(HBVMStepper):
 
         The run is over where it is known, from here, and more than the tolerance allows.
         """
-        ctx, shape = self._context, self._program.shape
-        estimate = ctx.estimate
+        ctx = self._context
+        estimate, shape = ctx.estimate, ctx.shape
         if estimate.noisy == TOO_NOISY and self._known_at == ctx.counters.steps:
             return NOISY
         self._known = known = self._noise(LENGTHS)
@@ -253,7 +253,7 @@ class AdaptiveStepper(HBVMStepper):
             return BUDGET
         rows, blocks = slice(-shape.rows, None), ctx.blocks
         estimate.noise[:] = 0.0
-        np.maximum.at(estimate.noise, shape.block, known.values[rows] / math.sqrt(self._program.constants.k))
+        np.maximum.at(estimate.noise, shape.block, known.values[rows] / math.sqrt(ctx.k))
         moved = np.maximum(np.abs(self.y), abs(ctx.h) * np.abs(known.slope))[rows]
         np.maximum.at(estimate.largest, shape.group[shape.block], moved * blocks.speed[shape.block])
         estimate.spacing = math.sqrt(known.relative)

@@ -78,7 +78,7 @@ def test_a_step_that_is_too_long_for_a_smooth_field_is_not_called_noisy():
 
 def told(first, count):
     """Return what smooth fields and those with jumps are told of noise, by adaptive steps."""
-    methods = [method for method in METHODS if method().h is None]
+    methods = [method for method in METHODS if method().options().get("h") is None]
     reasons = []
     for seed in range(first, first + count):
         problem = smooth_problem(seed)
