@@ -160,11 +160,11 @@ class LineIntegral(MethodBase):
             return (
                 "it needs the field as a formula, beside those of its invariants; write it as a VectorField."
             )
-        from integrators.kernel.line.kept import components
+        from integrators.kernel.line.kept import function_of
 
         try:
             for name in self.invariants:
-                components(problem.system, name)
+                function_of(problem.system, name)
         except InputError as error:
             return str(error)
         return None

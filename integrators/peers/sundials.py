@@ -117,12 +117,12 @@ class CVODEProgram(ProgramBase):
         if jacobian is None:
             return {}
         entries = self.entries
-        if jacobian.size > DENSE and jacobian.density < SPARSE:
+        if jacobian.shape[0] > DENSE and jacobian.density < SPARSE:
             from scipy.sparse import csc_matrix
 
             numbers = csc_matrix(
                 (np.arange(1, jacobian.rows.size + 1), (jacobian.rows, jacobian.columns)),
-                (jacobian.size, jacobian.size),
+                jacobian.shape,
             )
             order, values = np.asarray(numbers.data, dtype=np.int64) - 1, np.empty(jacobian.rows.size)
 

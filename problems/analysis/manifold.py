@@ -91,9 +91,10 @@ class _At:
         return values, sizes
 
     def _slopes(self, name: str, y: Array) -> Array:
-        gradient = self._system.gradient(name)
-        assert gradient is not None
-        return self._values(gradient, y).reshape(self._n, -1)
+        slopes = self._system.slopes(name)
+        matrix = np.zeros(slopes.shape)
+        matrix[slopes.rows, slopes.columns] = self._values(slopes.function, y)
+        return matrix
 
     def _matrices(self, y: Array) -> tuple[Array, Array]:
         """Return G and dw/dp."""

@@ -7,7 +7,7 @@ horizontal, or of a parabolic orbit. What rounding makes of it is a part of the 
 from collections.abc import Iterable
 from weakref import WeakKeyDictionary
 
-from problems.derive.function import Function, Loops, LoopTerm, Term, stacked
+from problems.derive.function import Function, renewed, stacked
 from problems.graph.nodes import STATE, Node
 
 _known: WeakKeyDictionary[Function, Function] = WeakKeyDictionary()
@@ -23,22 +23,7 @@ def with_sizes(function: Function) -> Function:
     """
     if function not in _known:
         sized = _Sizes(function.roots).known
-        outputs = tuple(
-            tuple(Term(node, term.key) for term in terms if (node := sized[term.node.id]) is not None)
-            for terms in function.outputs
-        )
-        loops: Loops = tuple(
-            (
-                loop,
-                tuple(
-                    LoopTerm(entry.index, node)
-                    for entry in entries
-                    if (node := sized[entry.node.id]) is not None
-                ),
-            )
-            for loop, entries in function.loops
-        )
-        sizes = Function(function.graph, outputs, loops)
+        sizes = renewed(function, function.graph, lambda node: sized[node.id])
         _known[function] = stacked([function, sizes], function.name)
     return _known[function]
 

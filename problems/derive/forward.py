@@ -11,10 +11,10 @@ such as the root of a distance, is computed once.
 
 from collections.abc import Callable, Sequence
 
-from problems.derive.function import Function, LoopTerm, Term
+from problems.derive.function import Function, renewed, stacked
 from problems.graph.fold import Copy, Fold, shifted
 from problems.graph.functions import FUNCTIONS, Slope
-from problems.graph.loops import Loop, Stage
+from problems.graph.loops import Stage
 from problems.graph.nodes import PAR, STATE, Graph, Node
 
 
@@ -57,34 +57,8 @@ def forward(
     [0.0, -0.878]
     """
     values = _Behind(Graph(function.graph.dof), size * directions)
-    along = [_Tangent(values, size, parameters, direction) for direction in range(directions)]
-    outputs = len(function.outputs)
-    products: list[tuple[Term, ...]] = [()] * (outputs * directions)
-    for i, terms in enumerate(function.outputs):
-        for direction, slopes in enumerate(along):
-            products[outputs * direction + i] = tuple(
-                Term(node, term.key) for term in terms if (node := slopes.of(term.node)) is not None
-            )
-    if beside:
-        products += [
-            tuple(Term(values.of(term.node), term.key) for term in terms) for terms in function.outputs
-        ]
-    loops: list[tuple[Loop, tuple[LoopTerm, ...]]] = []
-    for loop, entries in function.loops:
-        moved: list[LoopTerm] = []
-        for direction, slopes in enumerate(along):
-            for entry in entries:
-                node = slopes.of(entry.node)
-                if node is not None:
-                    moved.append(LoopTerm(entry.index.shifted(outputs * direction), node))
-        if beside:
-            moved += [
-                LoopTerm(entry.index.shifted(outputs * directions), values.of(entry.node))
-                for entry in entries
-            ]
-        if moved:
-            loops.append((values.graph.loop(loop.rows), tuple(moved)))
-    return Function(values.graph, tuple(products), tuple(loops), name)
+    parts = [_Tangent(values, size, parameters, direction).along(function) for direction in range(directions)]
+    return stacked([*parts, *([values.function(function)] if beside else [])], name)
 
 
 class _Behind(Copy):
@@ -96,6 +70,10 @@ class _Behind(Copy):
 
     def visit_symbol(self, node: Node) -> Node:
         return self.moved(node, self._shift if node.data[0] == "y" else 0)
+
+    def function(self, function: Function) -> Function:
+        """Return a function of the new arguments."""
+        return renewed(function, self.graph, self.of)
 
     def moved(self, node: Node, shift: int) -> Node:
         """Return a symbol whose place is moved."""
@@ -122,6 +100,10 @@ class Slopes(Fold[Node | None]):
     def of(self, root: Node) -> Node | None:
         self.values.of(root)
         return super().of(root)
+
+    def along(self, function: Function) -> Function:
+        """Return the derivatives of a function's outputs."""
+        return renewed(function, self.graph, self.of)
 
     def at(self, node: Node) -> Node:
         """Return the value of a node."""

@@ -1,9 +1,10 @@
 """Vector functions on a graph: what is differentiated, emitted and evaluated."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from problems.graph.each import Each
 from problems.graph.nodes import Affine, Graph, Loop, Node
 
 
@@ -107,17 +108,28 @@ class Function:
         )
 
     def __neg__(self) -> "Function":
-        outputs = tuple(tuple(Term(-term.node, term.key) for term in terms) for terms in self.outputs)
-        loops = tuple(
-            (loop, tuple(LoopTerm(entry.index, -entry.node) for entry in entries))
-            for loop, entries in self.loops
-        )
-        return Function(self.graph, outputs, loops)
+        return renewed(self, self.graph, lambda node: -node).named("")
 
 
 def function_of(graph: Graph, nodes: Iterable[Node], name: str = "") -> Function:
     """Return the function whose outputs are ``nodes``."""
     return Function(graph, tuple((Term(node, node.id),) for node in nodes), name=name)
+
+
+def renewed(function: Function, graph: Graph, change: Callable[[Node], Node | None]) -> Function:
+    """Return a function with other summands, those left out for which there is ``None``."""
+    outputs = tuple(
+        tuple(Term(node, term.key) for term in terms if (node := change(term.node)) is not None)
+        for terms in function.outputs
+    )
+    loops = (
+        (
+            graph.loop(loop.rows),
+            tuple(LoopTerm(e.index, node) for e in entries if (node := change(e.node)) is not None),
+        )
+        for loop, entries in function.loops
+    )
+    return Function(graph, outputs, tuple(part for part in loops if part[1]), function.name)
 
 
 def stacked(functions: Sequence[Function], name: str = "") -> Function:
@@ -132,6 +144,13 @@ def stacked(functions: Sequence[Function], name: str = "") -> Function:
         outputs.extend(function.outputs)
     name = name or ", ".join(function.name for function in functions)
     return Function(functions[0].graph, tuple(outputs), joined(moved), name)
+
+
+def array(function: Function) -> Each:
+    """Return the outputs of a function as an array that loops may read."""
+    loops = tuple((loop, tuple((e.index, e.node) for e in part)) for loop, part in function.loops)
+    terms = tuple((i, term.node) for i, summands in enumerate(function.outputs) for term in summands)
+    return Each(function.graph, len(function.outputs), loops, terms)
 
 
 def joined(parts: Iterable[tuple[int, Loops]]) -> Loops:

@@ -41,23 +41,23 @@ class Jacobian:
         One output per entry, for the emitters.
     rows, columns : ndarray of int64, shape (n,)
         Places of the entries, row by row and sorted in each row; all others are zero.
-    size : int
-        The matrix is size by size.
+    shape : tuple of int
+        Numbers of rows and columns.
     """
 
     function: Function
     rows: Integers
     columns: Integers
-    size: int
+    shape: tuple[int, int]
 
     @property
     def density(self) -> float:
         """Part of the matrix that is stored."""
-        return self.rows.size / self.size**2
+        return self.rows.size / (self.shape[0] * self.shape[1])
 
 
-def jacobian(function: Function, name: str) -> Jacobian | None:
-    """Return the derivatives of a function with respect to as many components of the state.
+def jacobian(function: Function, name: str, columns: int | None = None) -> Jacobian | None:
+    """Return the derivatives of a function with respect to components of the state.
 
     Parameters
     ----------
@@ -65,20 +65,23 @@ def jacobian(function: Function, name: str) -> Jacobian | None:
         A field, or the force of a separable system, which depends on the positions alone.
     name : str
         What generated code and messages call it.
+    columns : int, optional
+        How many components, by default as many as there are outputs.
 
     Returns
     -------
     Jacobian or None
         ``None`` where the list of entries would be larger than `LARGEST`.
     """
-    entries = _Entries(function.graph, len(function.outputs))
+    shape = len(function.outputs), len(function.outputs) if columns is None else columns
+    entries = _Entries(function.graph, shape[1])
     for loop, terms in function.loops:
         for term in terms:
             entries.of_loop_term(loop, term.index, term.node)
     for row, terms in enumerate(function.outputs):
         for term in terms:
             entries.of_term(row, term.node)
-    return entries.collected(name)
+    return entries.collected(name, shape)
 
 
 class _Entries:
@@ -161,7 +164,7 @@ class _Entries:
                 self._enter(some, row, _constant(some, column), product)
         for other, entries in inner.loops.items():
             for (at, column), node in entries.items():
-                first, second = _meeting(read, at.values(other))
+                first, second = meeting(read, at.values(other))
                 if first.size == 0:  # nothing reads what these terms fill
                     continue
                 both = _child(other, loop, first, second)
@@ -194,7 +197,7 @@ class _Entries:
         before = nodes.get((row, column))
         nodes[row, column] = node if before is None else before + node
 
-    def collected(self, name: str) -> Jacobian | None:
+    def collected(self, name: str, shape: tuple[int, int]) -> Jacobian | None:
         """Return the Jacobian; its entries in order, the loops' lists with their places."""
         lengths = [len(loop) * (loop.width + len(nodes)) for loop, nodes in self.loops.items()]
         if self.too_large or max(lengths, default=0) > LARGEST:
@@ -221,14 +224,14 @@ class _Entries:
                 terms.append(LoopTerm(Affine(place, 0), _moved(self.graph, node, loop, longer, 0)))
             loops.append((longer, tuple(terms)))
         function = Function(self.graph, tuple(outputs), tuple(loops), name)
-        return Jacobian(function, places // size, places % size, size)
+        return Jacobian(function, places // size, places % size, shape)
 
 
 def _constant(loop: Loop, place: int) -> Affine:
     return Affine((0,) * loop.width, place)
 
 
-def _meeting(read: Integers, filled: Integers) -> tuple[Integers, Integers]:
+def meeting(read: Integers, filled: Integers) -> tuple[Integers, Integers]:
     """Return the pairs (i, j) with ``read[i] == filled[j]``."""
     order = np.argsort(filled, kind="stable")
     low, high = (np.searchsorted(filled[order], read, side=side) for side in ("left", "right"))

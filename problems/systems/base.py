@@ -13,12 +13,22 @@ from numpy.typing import NDArray
 from problems import limits
 from problems.checks import NOTHING, Named, checked, number, numbers
 from problems.derive.forward import forward
-from problems.derive.function import Function, function_of, stacked
+from problems.derive.function import (
+    Function,
+    Loops,
+    LoopTerm,
+    Term,
+    array,
+    function_of,
+    joined,
+    stacked,
+)
 from problems.derive.gradient import gradient
 from problems.derive.jacobian import Jacobian, jacobian
 from problems.derive.reverse import Variables, reverse
 from problems.errors import InputError, shown, unknown
 from problems.graph import arguments
+from problems.graph.each import Each, components, length
 from problems.graph.nodes import Graph, Node, T
 from problems.graph.packed import packed, unpacked
 from problems.quantities import refuse_more_than_numbers
@@ -206,6 +216,21 @@ class System:
     def _node(self, value: Any, function: Callable[..., Any], label: str) -> Node:
         return arguments.scalar(value, graph=self._graph, function=function, label=label)
 
+    def _listed(self, value: Any, function: Callable[..., Any], label: str) -> Function:
+        """Return the function of a list of numbers, and of arrays that loops fill."""
+        outputs: list[tuple[Term, ...]] = [()] * length(value)
+        loops: list[tuple[int, Loops]] = []
+        for at, part in components(value):
+            if not isinstance(part, Each):
+                node = self._node(part, function, f"{label}'s component {at}")
+                outputs[at] = (Term(node, node.id),)
+                continue
+            for place, node in part.terms:
+                outputs[at + place] = (*outputs[at + place], Term(node, node.id))
+            terms = (tuple(LoopTerm(place, node) for place, node in entries) for _, entries in part.loops)
+            loops.append((at, tuple(zip((loop for loop, _ in part.loops), terms, strict=True))))
+        return Function(self._graph, tuple(outputs), joined(loops))
+
     def _scalar(self, function: Callable[..., Any], label: str) -> Node:
         return self._node(self._call(function, label), function, label)
 
@@ -370,7 +395,7 @@ class System:
         components: dict[str, Mapping[str, Function]] = {}
         for name, whole in self.invariants.items():
             n = len(whole.outputs)
-            parts = {f"{name}[{i}]": whole.part(i, i + 1).named(f"{whole.name}[{i}]") for i in range(n)}
+            parts = {f"{name}[{i}]": _component(whole, i) for i in range(n)}
             components |= {part: {part: function} for part, function in parts.items()}
             components[name] = parts if n > 1 else {name: whole}
         return components
@@ -424,6 +449,26 @@ class System:
             name = scalar.name.replace("invariant:", "gradient:", 1)
             self._gradients[scalar] = self._derivatives(scalar, name)
         return self._gradients[scalar]
+
+    def slopes(self, invariant: str) -> Jacobian:
+        """Return the derivatives of an invariant that are not identically 0, entry by entry.
+
+        Parameters
+        ----------
+        invariant : str
+            The name of an invariant, or of one of its `components`, one row for each of which there is.
+        """
+        parts: list[Function] = []
+        rows: list[int] = []
+        columns: list[int] = []
+        for row, scalar in enumerate(self.components(invariant).values()):
+            whole = self.gradient(scalar)
+            own = [d for d in range(self.dim) if whole.loops or whole.outputs[d]]
+            parts.append(whole if len(own) == self.dim else stacked([whole.part(d, d + 1) for d in own]))
+            rows += [row] * len(own)
+            columns += own
+        shape = len(parts), self.dim
+        return Jacobian(stacked(parts), np.array(rows, int), np.array(columns, int), shape)
 
     def _derivatives(self, scalar: Function, name: str) -> Function:
         return stacked([gradient(node, self.dim) for node in scalar.roots], name)
@@ -555,6 +600,12 @@ class System:
             else float(par[offset])
             for key, (offset, shape) in self._layout.items()
         }
+
+
+def _component(whole: Function, i: int) -> Function:
+    """Return one output; where loops fill the outputs, as a value of an array."""
+    alone = function_of(whole.graph, [array(whole)[i]]) if whole.loops else whole.part(i, i + 1)
+    return alone.named(f"{whole.name}[{i}]")
 
 
 def is_change(value: Any) -> bool:

@@ -1,4 +1,4 @@
-"""Mechanical systems with holonomic constraints, whose multipliers are eliminated symbolically."""
+"""Mechanical systems with holonomic constraints, whose multipliers are formulas."""
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
@@ -8,20 +8,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from problems.checks import NOTHING, Named, at_least, checked_arguments
-from problems.derive.elimination import Elimination, ZeroPivotError, least_fill
-from problems.derive.function import Function
-from problems.derive.gradient import gradient
+from problems.derive.elimination import ZeroPivotError
+from problems.derive.function import Function, array, joined, stacked
+from problems.derive.jacobian import Jacobian
+from problems.derive.multipliers import Motion, entries, places_of
 from problems.errors import InputError, shown
 from problems.graph import arguments
+from problems.graph.each import length
 from problems.graph.fold import Copy
-from problems.graph.nodes import Graph, Node, P, T
+from problems.graph.nodes import Graph, P, T
 from problems.graph.source_line import line_of_function
 from problems.systems.base import System, Value
 from problems.systems.hamiltonian import Hamiltonian
 from problems.systems.lagrangian import Lagrangian
 
 Array = NDArray[np.float64]
-Row = dict[int, Node]
 
 
 class Constrained(System):
@@ -40,9 +41,10 @@ class Constrained(System):
         \frac{\partial w}{\partial p} G^T \lambda = \frac{\partial w}{\partial q} u
             + \frac{\partial w}{\partial p} \Big( f - \frac{\partial H}{\partial q} \Big),
 
-    whose symmetric matrix :math:`G (\partial^2 H / \partial p^2) G^T` is factored symbolically, without the
-    zeros between constraints that share no coordinate: a chain costs O(n). With these multipliers q' and p'
-    are an ordinary system (of index 0). On the manifold g = 0, w = 0 its invariants are the energy,
+    whose symmetric matrix :math:`G (\partial^2 H / \partial p^2) G^T` is factored as L D L', without the zeros
+    between constraints that share no coordinate: a chain costs O(n). Equal constraints may be written in
+    loops, with ``m.each``; the code then grows with the logarithm of their number. With these multipliers q'
+    and p' are an ordinary system (of index 0). On the manifold g = 0, w = 0 its invariants are the energy,
     ``"constraints"`` (all g) and ``"constraint_rates"`` (all w). `integrators.HBVM` conserves them at
     round-off.
 
@@ -52,7 +54,7 @@ class Constrained(System):
         The energy, a function as for `Hamiltonian`; or a system without constraints, whose ``dof`` and
         ``parameters`` are taken.
     constraints : sequence of callable
-        Functions g whose arguments are among ``q, par, m``. Each returns one number or a list.
+        Functions g whose arguments are among ``q, par, m``. Each returns one number, a list, or ``m.each``.
     dof : int, optional
         Number of coordinates q.
     parameters, guards, name
@@ -128,7 +130,8 @@ class Constrained(System):
         for key in ("hamiltonian", "momentum"):
             if key in free._written:
                 self._written[key] = free._written[key]
-        self._eliminate(self._traced_constraints(constraints), None if force is None else self._forces(force))
+        forces = None if force is None else self._forces(force)
+        self._eliminate(free, *self._traced_constraints(constraints), forces)
         self._trace_declared(invariants, guards)
         of_energy = ["energy"] if "invariant:energy" in self._written else []
         self._list([*of_energy, "constraints", "constraint_rates", *invariants], guards)
@@ -157,11 +160,25 @@ class Constrained(System):
         free._list([], [])
         return free
 
+    def jacobian(self, function: str = "field") -> Jacobian | None:
+        """``None`` of the field: multipliers depend on all that is linked, so differences cost no more."""
+        return None if function == "field" else super().jacobian(function)
+
+    def slopes(self, invariant: str) -> Jacobian:
+        if invariant not in {"constraints", "constraint_rates"}:
+            return super().slopes(invariant)
+        if invariant not in self._jacobians:
+            self._jacobians[invariant] = entries(self.invariants[invariant], self.dim)
+        found = self._jacobians[invariant]
+        assert found is not None
+        return found
+
     def _offered(self, graph: Graph) -> dict[str, Callable[[], Any]]:
         copy = Copy(graph)
         return {"multipliers": lambda: [copy.of(root) for root in self.multipliers.roots]}
 
-    def _traced_constraints(self, constraints: Sequence[Callable[..., Any]]) -> list[tuple[str, Node]]:
+    def _traced_constraints(self, constraints: Sequence[Callable[..., Any]]) -> tuple[Function, list[str]]:
+        """Return all constraints as one function, and of each the line where it is written."""
         if (
             not isinstance(constraints, list | tuple)
             or not constraints
@@ -170,122 +187,72 @@ class Constrained(System):
             raise InputError(
                 f"constraints={shown(constraints)} must be a list of functions, such as constraints=[rod]."
             )
-        found = []
+        parts: list[Function] = []
+        lines: list[str] = []
         for i, function in enumerate(constraints):
-            label = f"constraints[{i}]"
+            label, line = f"constraints[{i}]", line_of_function(function)
             value = self._call(function, label)
-            values = value if arguments.is_list(value) else [value]
-            for part in values:
-                node = self._node(part, function, label)
-                if node.flags & (P | T):
-                    raise InputError(
-                        f"{line_of_function(function)}: a constraint depends on "
-                        + (
-                            "momenta; it must be a function of q."
-                            if node.flags & P
-                            else "the time; take the time as a further coordinate q[n], with H + p[n]."
-                        )
-                    )
-                found.append((line_of_function(function), node))
-        return found
-
-    def _forces(self, force: Callable[..., Any]) -> list[Node]:
-        value, dof = self._call(force, "force"), self.dim // 2
-        if not arguments.is_list(value) or len(value) != dof:
-            raise InputError(f"{line_of_function(force)}: force must return a list of dof={dof} numbers.")
-        return [self._node(part, force, "force") for part in value]
-
-    def _slopes(self, node: Node) -> Row:
-        """Return the derivatives that are not 0, by the component of the state."""
-        whole = gradient(node, self.dim)
-        if whole.loops:
-            raise InputError(
-                f"{self.name}: with constraints the energy and the constraints are written without m.sum; "
-                "use sum(... for i in range(n))."
-            )
-        found: Row = {}
-        for i, terms in enumerate(whole.outputs):
-            for term in terms:
-                found[i] = found[i] + term.node if i in found else term.node
-        return found
-
-    def _eliminate(self, constraints: list[tuple[str, Node]], force: list[Node] | None) -> None:
-        """Write the field, the multipliers and the invariants."""
-        graph, dof = self._graph, self.dim // 2
-        zero = graph.const(0.0)
-        [energy] = self._written["hamiltonian"].roots
-        slope = self._slopes(energy)
-        speed = {i - dof: node for i, node in slope.items() if i >= dof}
-        push = {i: -node for i, node in slope.items() if i < dof}
-        for i, node in enumerate(force or ()):
-            push[i] = push[i] + node if i in push else node
-        rows, rates = [], []
-        for line, node in constraints:
-            row = self._slopes(node)
-            rate = _product(row, speed)
-            if rate is None:
-                raise InputError(f"{line}: a constraint depends on no coordinate that moves; leave it out.")
-            if rate.flags & T:
+            part = self._listed(value if arguments.is_list(value) else [value], function, label)
+            flags = [node.flags for node in part.roots]
+            if any(flag & P for flag in flags):
+                raise InputError(f"{line}: a constraint depends on momenta; it must be a function of q.")
+            if any(flag & T for flag in flags):
                 raise InputError(
-                    f"{line}: the velocities depend on the time; take it as a further coordinate q[n], with "
-                    "H + p[n]."
+                    f"{line}: a constraint depends on the time; take the time as a further coordinate q[n], "
+                    "with H + p[n]."
                 )
-            rows.append(row)
-            rates.append(rate)
-        turns = [self._slopes(rate) for rate in rates]
-        by_speed = [{i - dof: node for i, node in turn.items() if i >= dof} for turn in turns]
-        n = len(rows)
-        matrix = {
-            (a, b): node
-            for a in range(n)
-            for b in range(a + 1)
-            if (node := _product(by_speed[a], rows[b])) is not None
-        }
-        order = least_fill([{b for b in range(n) if (max(a, b), min(a, b)) in matrix} for a in range(n)])
-        right = []
-        for a in order:
-            along = {i: node for i, node in turns[a].items() if i < dof}
-            first, second = _product(along, speed), _product(by_speed[a], push)
-            terms = [term for term in (first, second) if term is not None]
-            right.append(sum(terms[1:], terms[0]) if terms else zero)
-        ordered = [
-            {
-                j: matrix[max(a, b), min(a, b)]
-                for j, b in enumerate(order[: i + 1])
-                if (max(a, b), min(a, b)) in matrix
-            }
-            for i, a in enumerate(order)
-        ]
+            parts.append(part)
+            lines += [line] * len(part.outputs)
+        return stacked(parts, "invariant:constraints"), lines
+
+    def _forces(self, force: Callable[..., Any]) -> Function:
+        value, dof = self._call(force, "force"), self.dim // 2
+        if not arguments.is_list(value) or length(value) != dof:
+            raise InputError(f"{line_of_function(force)}: force must return a list of dof={dof} numbers.")
+        return self._listed(value, force, "force")
+
+    def _eliminate(
+        self, free: Hamiltonian, constraints: Function, lines: list[str], force: Function | None
+    ) -> None:
+        """Write the field, the multipliers and the invariants."""
+        dof = self.dim // 2
+        velocity, push = free.field.part(0, dof), free.field.part(dof, 2 * dof)
+        if force is not None:
+            outputs = tuple(a + b for a, b in zip(push.outputs, force.outputs, strict=True))
+            push = Function(self._graph, outputs, joined([(0, push.loops), (0, force.loops)]))
+        if velocity.loops and free.velocity_scale is None:
+            raise InputError(
+                f"{self.name}: with constraints, momenta stand in m.sum as p[i]**2/(2*m) with constant "
+                "masses only; write the energy with sum(... for i in range(n))."
+            )
+        motion = Motion(velocity, push, free.velocity_scale)
+        rates = motion.along(constraints).named("invariant:constraint_rates")
+        moving = places_of(rates)
+        for i, line in enumerate(lines):
+            if i not in moving:
+                raise InputError(f"{line}: a constraint depends on no coordinate that moves; leave it out.")
+        if any(node.flags & T for node in rates.roots):
+            raise InputError(
+                f"{lines[0]}: the velocities depend on the time; take it as a further coordinate q[n], with "
+                "H + p[n]."
+            )
         try:
-            solved = Elimination(ordered).solve(right)
+            multipliers, momenta = motion.multipliers(constraints, rates)
         except ZeroPivotError as error:
             raise InputError(
-                f"{constraints[order[error.row]][0]}: the constraint follows from the others, or moves "
+                f"{lines[error.row]}: the constraint follows from the others, or moves "
                 "nothing with a mass; leave it out."
             ) from None
-        multipliers = [solved[order.index(a)] for a in range(n)]
-        slopes = [push.get(i, zero) for i in range(dof)]
-        for row, multiplier in zip(rows, multipliers, strict=True):
-            for i, node in row.items():
-                slopes[i] = slopes[i] - node * multiplier
-        self._write("field", [*(speed.get(i, zero) for i in range(dof)), *slopes])
+        self._written["field"] = self._listed([array(velocity), momenta], repr, "field").named("field")
         self._write("multipliers", multipliers)
-        self._write("invariant:constraints", [node for _, node in constraints])
-        self._write("invariant:constraint_rates", rates)
+        self._written["invariant:constraints"], self._written["invariant:constraint_rates"] = (
+            constraints, rates,
+        )  # fmt: skip
         self._vectors |= {"constraints", "constraint_rates"}
+        [energy] = self._written["hamiltonian"].roots
         if force is None and not energy.flags & T:
             self._write("invariant:energy", [energy])
 
 
 _SHARED = ("name", "dim", "dof", "bodies", "parameters", "_layout", "n_par", "_graph")
 """What `Constrained.free` has of it."""
-
-
-def _product(a: Row, b: Row) -> Node | None:
-    """Return the sum of the products of entries that both have; ``None`` if there are none."""
-    total: Node | None = None
-    for i, node in a.items():
-        if i in b:
-            term = node * b[i]
-            total = term if total is None else total + term
-    return total

@@ -5,6 +5,7 @@ from functools import cached_property
 from typing import Annotated, Any
 
 from problems.checks import NOTHING, Named, at_least, checked_arguments
+from problems.derive.elimination import Elimination, ZeroPivotError, with_nodes
 from problems.derive.function import Function
 from problems.derive.gradient import gradient
 from problems.errors import InputError
@@ -114,36 +115,21 @@ class Lagrangian(Hamiltonian):
                 f"{self._line}: L is not quadratic in v as it is written; expand it, or give the Hamiltonian."
             )
         zero = graph.const(0.0)
-
-        def times(*factors: Node) -> Node:
-            if any(factor is zero for factor in factors):
-                return zero
-            total, *others = factors
-            for factor in others:
-                total = total * factor
-            return total
-
         rest = [graph.symbol("y", dof + i, flags=P) - self._at_rest(p) for i, p in enumerate(momenta)]
-        lower = [[zero] * dof for _ in range(dof)]
-        diagonal: list[Node] = []
-        energy = -self._at_rest(lagrangian)
-        for j in range(dof):
-            pivot = mass[j][j]
-            for k in range(j):
-                pivot = pivot - times(lower[j][k], lower[j][k], diagonal[k])
-                rest[j] = rest[j] - times(lower[j][k], rest[k])
-            if pivot is zero:
-                raise InputError(f"{self._line}: L does not depend on v[{j}] by itself; each needs a mass.")
-            diagonal.append(pivot)
-            for i in range(j + 1, dof):
-                entry = mass[i][j]
-                for k in range(j):
-                    entry = entry - times(lower[i][k], lower[j][k], diagonal[k])
-                lower[i][j] = zero if entry is zero else entry / pivot
+        places = [(i, j) for i in range(dof) for j in range(i + 1) if mass[i][j] is not zero]
+        try:
+            solved = Elimination(
+                {place: number for number, place in enumerate(places)},
+                [mass[i][j] for i, j in places], rest, [[j] for j in range(dof)], with_nodes,
+            ).forward()  # fmt: skip
+        except ZeroPivotError as error:
+            raise InputError(
+                f"{self._line}: L does not depend on v[{error.row}] by itself; each needs a mass."
+            ) from None
         kinetic = zero
-        for z, pivot in zip(rest, diagonal, strict=True):
+        for z, pivot in solved.values():
             kinetic = kinetic + z * z / (2.0 * pivot)
-        return kinetic + energy
+        return kinetic - self._at_rest(lagrangian)
 
     def _at_rest(self, root: Node) -> Node:
         """Return a node where all velocities are 0."""

@@ -4,10 +4,9 @@ from collections.abc import Callable
 from typing import Annotated, Any
 
 from problems.checks import NOTHING, Named, at_least, checked_arguments
-from problems.derive.function import Function, Loops, LoopTerm, Term, joined
 from problems.errors import InputError
 from problems.graph import arguments
-from problems.graph.each import Each, components, length
+from problems.graph.each import length
 from problems.graph.source_line import line_of_function
 from problems.systems.base import System, Value
 
@@ -57,23 +56,8 @@ class VectorField(System):
                 f"{line_of_function(f)}: f returns {got}, not a list of dim={dim}; "
                 "return one derivative for each component of y."
             )
-        self._written["field"] = self._joined(f, value)
+        self._written["field"] = self._listed(value, f, "f").named("field")
         self._trace_declared(invariants, guards)
-
-    def _joined(self, f: Callable[..., Any], value: Any) -> Function:
-        """Return the function of a list of numbers, and of arrays that loops fill."""
-        outputs: list[tuple[Term, ...]] = [()] * self.dim
-        loops: list[tuple[int, Loops]] = []
-        for at, part in components(value):
-            if not isinstance(part, Each):
-                node = self._node(part, f, f"f's component {at}")
-                outputs[at] = (Term(node, node.id),)
-                continue
-            for place, node in part.terms:
-                outputs[at + place] = (*outputs[at + place], Term(node, node.id))
-            terms = (tuple(LoopTerm(place, node) for place, node in entries) for _, entries in part.loops)
-            loops.append((at, tuple(zip((loop for loop, _ in part.loops), terms, strict=True))))
-        return Function(self._graph, tuple(outputs), joined(loops), "field")
 
     def __repr__(self) -> str:
         return f"VectorField({self.name}, dim={self.dim})"

@@ -1,6 +1,6 @@
 """What a line integral keeps: the functions and the memory that a program needs for it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -53,8 +53,8 @@ class Kept:
         )
 
         self.system = system
-        scalars = {part: scalar for name in invariants for part, scalar in components(system, name).items()}
-        self.names = list(scalars)
+        functions = [function_of(system, name) for name in invariants]
+        self.names = [part for name in invariants for part in system.components(name)]
         whole = [name.partition("[")[0] for name in self.names]
         self._on_manifold = [name in system.on_manifold for name in whole]
         self._derived = [name in system.derived for name in whole]
@@ -63,13 +63,13 @@ class Kept:
         pattern = Pattern.of(system, [])
         if n:
             assert system.field is not None  # LineIntegral refuses code
-            gradients = [system.gradient(scalar) for scalar in scalars.values()]
-            pattern = Pattern.of(system, gradients)
-            entries = [pattern.entries(a, gradient) for a, gradient in enumerate(gradients)]
+            slopes = [system.slopes(name) for name in invariants]
+            pattern = Pattern.of(system, slopes)
+            entries = [part.function for part in slopes]
             # Forces of constraints cancel others, and rounding is a part of each
             sizes = [with_sizes(system.field).part(dim, 2 * dim)] if system.on_manifold else []
             self.values = system.together(system.field, *entries, *sizes)
-            measure = system.together(*entries, *scalars.values())
+            measure = system.together(*entries, *functions)
             self.code.append(compile_field(system, measure, constants.lanes))
         else:
             assert isinstance(system, Poisson)
@@ -139,18 +139,18 @@ class Kept:
             own.active[:] = independent(self.system, self.values, self._pattern, own.metric, y, par, t0)
 
 
-def components(system: System, name: str) -> Mapping[str, Function]:
-    """Return the scalars that an invariant consists of, as `System.components` does.
+def function_of(system: System, name: str) -> Function:
+    """Return an invariant, or one component of it.
 
     Raises
     ------
     problems.errors.InputError
         If there is none of this name, or it depends on time.
     """
-    functions = system.components(name)
-    if any(node.flags & T for function in functions.values() for node in function.roots):
+    parts = system.components(name)
+    if any(node.flags & T for function in parts.values() for node in function.roots):
         raise InputError(f"the invariant {name!r} of {system.name} depends on time; leave it out.")
-    return functions
+    return system.invariants.get(name) or parts[name]
 
 
 def metric_of(system: System, par: Array) -> Array:

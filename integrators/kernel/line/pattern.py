@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from integrators.protocol import Array
 from problems.derive.elimination import least_fill
-from problems.derive.function import Function, stacked
+from problems.derive.jacobian import Jacobian
 from problems.problem import System
 
 
@@ -32,22 +32,15 @@ class Pattern:
     tables: dict[str, NDArray[np.int64]]
 
     @classmethod
-    def of(cls, system: System, gradients: Sequence[Any]) -> "Pattern":
-        """Return the pattern of gradients, dim outputs each."""
-        dim = system.dim
-        columns = [[d for d in range(dim) if gradient.loops or gradient.outputs[d]] for gradient in gradients]
-        return cls(dim, columns, _tables(system, columns))
+    def of(cls, system: System, slopes: Sequence[Jacobian]) -> "Pattern":
+        """Return the pattern of the gradients of invariants, one after another."""
+        columns = [part.columns[part.rows == a].tolist() for part in slopes for a in range(part.shape[0])]
+        return cls(system.dim, columns, _tables(system, columns))
 
     @property
     def count(self) -> int:
         """Number of entries."""
         return sum(map(len, self.columns))
-
-    def entries(self, a: int, gradient: Function) -> Function:
-        """Return the entries of the gradient of invariant a alone."""
-        if len(self.columns[a]) == self.dim:
-            return gradient
-        return stacked([gradient.part(d, d + 1) for d in self.columns[a]], gradient.name)
 
     def gradients(self, entries: Array) -> Array:
         """Return gradients, shape (n, dim), from their entries."""

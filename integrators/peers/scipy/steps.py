@@ -130,8 +130,8 @@ class SciPyStepper(StepperBase):
         assert jacobian is not None
         values = np.empty(jacobian.rows.size)
         self._program.entries(t, y, self._par, values)
-        shape = (jacobian.size, jacobian.size)
-        if self._sparse and jacobian.size > DENSE and jacobian.density < SPARSE:
+        shape = jacobian.shape
+        if self._sparse and jacobian.shape[0] > DENSE and jacobian.density < SPARSE:
             return csc_matrix((values, (jacobian.rows, jacobian.columns)), shape=shape)
         matrix = np.zeros(shape)
         matrix[jacobian.rows, jacobian.columns] = values

@@ -14,7 +14,7 @@ STEP = 2.0**-20
 def dense(system, what, state, par, limit):
     """Return a Jacobian as a matrix, its entries from the emitted function."""
     found = system.jacobian(what)
-    matrix = np.zeros((found.size, found.size))
+    matrix = np.zeros(found.shape)
     matrix[found.rows, found.columns] = targets.numpy(system, found, limit=limit)(0.3, state, par)
     return matrix
 
