@@ -21,6 +21,7 @@ from problems.derive.jacobian import Jacobian, jacobian, meeting
 from problems.errors import InputError
 from problems.graph.each import Constants, Each
 from problems.graph.fold import Copy, shifted
+from problems.graph.loops import Affine
 from problems.graph.nodes import STATE, Node, P
 from problems.graph.sums import Index
 
@@ -135,8 +136,8 @@ class _Along(Slopes):
     def visit_symbol(self, node: Node) -> Node | None:
         (_, place), loop, dof = node.data, node.loop, self._motion.dof
         of_momenta = (place if loop is None else int(place.values(loop)[0])) >= dof
-        place = shifted(place, -dof if of_momenta else 0)
-        i = place if loop is None else Index(self.graph, loop, place)
+        i = shifted(place, -dof if of_momenta else 0)
+        i = Index(self.graph, loop, i) if loop is not None and isinstance(i, Affine) else i
         return self._motion.pushed(i) if of_momenta else self._motion.speed(i)
 
 
