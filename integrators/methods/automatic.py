@@ -62,6 +62,8 @@ STEP, ROW, ITERATION, OPERATION, PRODUCT = 210.0, 16.0, 39.0, 0.43, 1.1
 WEIGHTS = {
     "symbol": 0,
     "index": 0,
+    "entry": 0,
+    "element": 0,
     "add": 1,
     "sub": 1,
     "mul": 1,
