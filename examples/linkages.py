@@ -1,13 +1,14 @@
 """Linkages in Cartesian coordinates: energy and constraints at round-off, with no option of the method.
 
-A spherical pendulum, a four-bar linkage (closed), a chain of ten links, and a rigid molecule of water that
-moves and turns. Beside each: DOP853 on the same equations, whose constraints drift.
+A spherical pendulum, a four-bar linkage (closed), a chain of ten links, a rigid molecule of water that
+moves and turns, a slider-crank, and a heavy top whose attitude is a quaternion. Beside each: DOP853 on the
+same equations, whose constraints drift.
 """
 
 import numpy as np
 
 from integrators import DOP853, HBVM, integrate
-from problems import Constrained, Problem
+from problems import Constrained, Lagrangian, Problem
 
 
 def linkage(places, rods, masses, fixed=(), gravity=1.0):
@@ -33,6 +34,47 @@ def linkage(places, rods, masses, fixed=(), gravity=1.0):
     return system, places[free].ravel()
 
 
+def slider_crank():
+    """Return a crank and a rod, homogeneous bars, and a slider: two angles, and the slider's place.
+
+    Lengths .15 and .3, masses 1, 2 and 1; nothing pulls, and the crank turns about once in a unit of time.
+    """
+
+    def L(q, v, m):
+        # the middle of the rod: its masses' velocity, and its turning about it
+        x = -0.15 * (m.sin(q[0]) * v[0] + m.sin(q[1]) * v[1])
+        y = 0.15 * (m.cos(q[0]) * v[0] + m.cos(q[1]) * v[1])
+        return 0.15**2 * v[0] ** 2 / 6 + x**2 + y**2 + 0.3**2 * v[1] ** 2 / 12 + v[2] ** 2 / 2
+
+    def closed(q, m):
+        along = 0.15 * m.cos(q[0]) + 0.3 * m.cos(q[1]) - q[2]
+        return [along, 0.15 * m.sin(q[0]) + 0.3 * m.sin(q[1])]
+
+    system = Constrained(Lagrangian(L, dof=3), constraints=[closed])
+    return Problem(system, q0=[0.0, 0.0, 0.45], v0=[6.0, -3.0, 0.0], t_end=20.0)
+
+
+def top():
+    """Return a heavy top with one point fixed, moments of inertia 1, 1.2 and .5, by its quaternion.
+
+    Twice the angular momenta about its axes are bilinear in q and p; that of the length of q has any mass.
+    """
+
+    def rows(q):
+        w, x, y, z = (q[i] for i in range(4))
+        return [[w, x, y, z], [-x, w, z, -y], [-y, -z, w, x], [-z, y, -x, w]]
+
+    def H(q, p):
+        momenta = [sum(row[i] * p[i] for i in range(4)) for row in rows(q)]
+        turning = sum(s**2 / (8 * J) for s, J in zip(momenta, (1.0, 1.0, 1.2, 0.5), strict=True))
+        return turning + q[0] ** 2 - q[1] ** 2 - q[2] ** 2 + q[3] ** 2
+
+    system = Constrained(H, constraints=[lambda q: sum(q[i] ** 2 for i in range(4)) - 1], dof=4)
+    q0 = np.array([np.cos(0.25), np.sin(0.25), 0.0, 0.0])
+    p0 = 2 * np.array([0.0, 0.1, 0.24, 2.5]) @ rows(q0)
+    return Problem(system, q0=q0, p0=p0, t_end=20.0)
+
+
 def cases():
     """Yield names and problems."""
     system, q = linkage([[0, 0, 0], [0.8, 0, -0.6]], [(0, 1)], [1.0], fixed=[0])
@@ -47,6 +89,8 @@ def cases():
     system, q = linkage(water, [(0, 1), (0, 2), (1, 2)], [15.999, 1.008, 1.008], gravity=0.0)
     spin = [0, 0, 0, 0, 0.3, 1.0, 0.2, 0, -0.5]
     yield "rigid water", Problem(system, q0=q, v0=spin, t_end=20.0, project=True)
+    yield "slider-crank", slider_crank()
+    yield "heavy top", top()
 
 
 def main() -> None:

@@ -41,7 +41,7 @@ class Constrained(System):
         \frac{\partial w}{\partial p} G^T \lambda = \frac{\partial w}{\partial q} u
             + \frac{\partial w}{\partial p} \Big( f - \frac{\partial H}{\partial q} \Big),
 
-    whose symmetric matrix :math:`G (\partial^2 H / \partial p^2) G^T` is factored as L D L', without the zeros
+    whose symmetric matrix :math:`G (\partial^2 H / \partial p^2) G^T` is factored as L D L', without zeros
     between constraints that share no coordinate: a chain costs O(n). Equal constraints may be written in
     loops, with ``m.each``; the code then grows with the logarithm of their number. With these multipliers q'
     and p' are an ordinary system (of index 0). On the manifold g = 0, w = 0 its invariants are the energy,
