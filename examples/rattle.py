@@ -32,7 +32,7 @@ ANGLES, T_END = np.array([0.5, 0.5]), 50.0
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Rattle(FixedStep):
-    """Compositions of ``p += h/2 f - G' l, q += h C p`` with g(q) = 0, and ``p += h/2 f - G' m``, G C p = 0."""
+    """Compositions of ``p += h/2 f - G' l, q += h C p`` with g(q) = 0, ``p += h/2 f - G' m``, G C p = 0."""
 
     composed: int = 2
     library, family, citation = "this example", "splitting", "H. C. Andersen, J. Comput. Phys. 52 (1983) 24"

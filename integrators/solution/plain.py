@@ -100,11 +100,12 @@ _TEXTS = ("title", "notes", "_made_with")
 def _checked(state: dict[Any, Any], system: System) -> dict[str, Any]:
     """Return the parts of a problem, each of the type and shape that compiled code takes for granted."""
     parts = {"y0", "par", "times", "t0", "t_end", "name", "arguments", "references", *_TEXTS}
-    if set(state) - {"bodies"} != parts:  # only bodies with names have the key
+    if set(state) - {"bodies", "moved"} != parts:  # of bodies with names, and of a start that was moved
         refuse("a problem has other parts")
     n_times = None if state["times"] is None else np.size(state["times"])
-    for key, size in {"y0": system.dim, "par": system.n_par, "times": n_times}.items():
-        if size is not None:
+    sizes = {"y0": system.dim, "par": system.n_par, "times": n_times, "moved": system.dim}
+    for key, size in sizes.items():
+        if key in state and size is not None:
             state[key] = doubles(state[key], (size,), key)
             if not np.isfinite(state[key]).all():
                 refuse(f"{key} is not finite")

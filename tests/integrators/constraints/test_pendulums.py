@@ -234,13 +234,17 @@ def test_a_lagrangian_with_a_mass_matrix_takes_constraints():
 def test_a_constrained_problem_is_kept_by_files_and_pickles(tmp_path):
     import pickle
 
-    problem = pickle.loads(pickle.dumps(pendulum(10.0)))
+    def moved():
+        return Problem(chain(1), q0=[1.1, 0.0], p0=[0.0, 0.0], t_end=10.0, project=True)
+
+    problem = pickle.loads(pickle.dumps(moved()))
     solution = integrate(problem, HBVM(), [10.0])
-    assert np.array_equal(solution.y, integrate(pendulum(10.0), HBVM(), [10.0]).y)
+    assert np.array_equal(solution.y, integrate(moved(), HBVM(), [10.0]).y)
     solution.save(tmp_path / "run.npz")
     again = integrators.load(tmp_path / "run.npz")
     assert np.array_equal(again.multipliers, solution.multipliers)
     assert np.array_equal(again.v, solution.v)
+    assert np.array_equal(again.problem.moved, problem.moved)
 
 
 @pytest.mark.slow
