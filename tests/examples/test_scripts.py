@@ -39,6 +39,8 @@ SAYS = {
     "long_run.py": ["interrupted at t = ", "the same bits as without a break: True"],
     "scaling.py": ["| threads | time (s) | speed-up | efficiency |", "\n| 1 | ", " | 1.00 | 100% |"],
     "section.py": ["3793 passages", "accurate: HBVM, heyoka"],
+    "rattle.py": ["HBVM() is nearest to the problem in angles: True"],
+    "water.py": ["HBVM() keeps energy and bonds at round-off: True"],
     "solution.py": ["the same from a file: True True", "the same from another process: True"],
 }
 
@@ -97,7 +99,15 @@ def test_the_page_of_tasks_says_when_with_what_kernel_and_beside_what_load(monke
 # What takes longest: two references, XLA, many processes, a search for settings of each library.
 SLOW = {"own_campaign.py", "campaign.py", "bodies.py", "fit.py", "radial_velocities.py", "long_runs.py"}
 SLOW |= {"scaling.py", "section.py", "lattice.py", "linkages.py", "star_cluster.py", "encounters.py"}
-SLOW |= {"molecular_dynamics.py", "exponents.py", "plugin.py", "stiff.py", "own_system.py"}
+SLOW |= {
+    "water.py",
+    "rattle.py",
+    "molecular_dynamics.py",
+    "exponents.py",
+    "plugin.py",
+    "stiff.py",
+    "own_system.py",
+}
 
 
 @pytest.mark.parametrize(
