@@ -17,10 +17,11 @@ FIELDS = {
     "Celestial mechanics": (
         "bodies", "long_run", "long_runs", "encounters", "star_cluster", "radial_velocities", "geodesics",
     ),
-    "Molecules": ("molecular_dynamics", "molecular_dynamics_sizes"),
+    "Molecules": ("molecular_dynamics", "molecular_dynamics_sizes", "water"),
     "Lattices and partial differential equations": ("lattice", "networks"),
     "Mechanics": (
-        "own_system", "linkages", "mass_matrix", "impacts", "bouncing_ball", "measured_forcing", "fit",
+        "own_system", "linkages", "rattle", "mass_matrix", "impacts", "bouncing_ball", "measured_forcing",
+        "fit",
     ),
     "Chaos": ("section", "exponents", "chaos_map", "ensemble", "short"),
     "Stiff chemistry": ("stiff",),
