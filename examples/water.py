@@ -48,7 +48,7 @@ def water(side: int, t_end: float = 1.0) -> Problem:
         return m.each(lambda i: list(of(i)), range(n))
 
     random = np.random.default_rng(0)
-    corners = 3.1 * np.stack(np.indices((side, side, side)), axis=-1).reshape(-1, 1, 3)
+    corners = 3.1 * np.indices((side,) * 3).reshape(3, -1).T[:, np.newaxis]
     turns = np.stack([np.linalg.qr(random.standard_normal((3, 3)))[0] for _ in range(n)])
     places = corners + MOLECULE @ turns
     system = Constrained(H, constraints=[bonds], dof=9 * n, name="water")
