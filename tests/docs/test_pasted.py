@@ -19,6 +19,12 @@ PROMPTED = re.compile(r"^(?:>>> |\.\.\. ?)(.*)$", re.MULTILINE)  # what the site
 PASTED = [
     page for page in pages.sources() if page.name != QUOTED and BLOCK.search(page.read_text(encoding="utf-8"))
 ]
+
+
+def _name(page):
+    return str(page.relative_to(pages.ROOT))
+
+
 QUICK = ("README.md", "start.md", "solutions.md", "own_hamiltonian.md")
 PEERS = ("heyoka", "rebound", "diffrax", "jax", "torch")
 
@@ -32,21 +38,27 @@ def pasted(page):
     return "\n".join(["from tests.docs.pages import shell as _shell, write as _write", *typed])
 
 
-@pytest.mark.parametrize(
-    "page", [pages.ROOT / "README.md", pages.DOCS / "index.md"], ids=lambda page: page.name
-)
-def test_the_first_examples_can_be_pasted_into_a_prompt(page):
-    console = code.InteractiveConsole()
-    typed = pasted(page)
-    with contextlib.redirect_stderr(io.StringIO()) as errors, contextlib.redirect_stdout(io.StringIO()):
-        waits = [console.push(line) for line in [*typed.splitlines(), ""]]
-    assert (errors.getvalue(), waits[-1]) == ("", False)
+class Typed(code.InteractiveConsole):
+    """A prompt that reads and does not run."""
+
+    def runcode(self, code):
+        pass
+
+
+@pytest.mark.parametrize("page", PASTED, ids=_name)
+def test_what_has_prompts_can_be_pasted_into_one(page):
+    console = Typed()
+    with contextlib.redirect_stderr(io.StringIO()) as errors:
+        for block in re.findall(r"^```python\n(>>> .*?)^```", page.read_text(encoding="utf-8"), re.M | re.S):
+            waits = [console.push(line) for line in [*PROMPTED.findall(block), ""]]
+            assert not waits[-1]
+    assert errors.getvalue() == ""
 
 
 @pytest.mark.parametrize(
     "page",
     [pytest.param(page, marks=[] if page.name in QUICK else [pytest.mark.slow]) for page in PASTED],
-    ids=[str(page.relative_to(pages.ROOT)) for page in PASTED],
+    ids=map(_name, PASTED),
 )
 def test_a_page_runs_pasted_from_top_to_bottom(page, tmp_path):
     script = tmp_path / "page.py"
