@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from problems import double_double
 from problems.graph.functions import WHOLE
-from problems.targets.room import room
+from problems.targets.called import room
 
 Numbers = NDArray[np.complex128]
 """Arrays of numbers."""
@@ -200,7 +200,13 @@ def whole(a):
     return complex(high, 0.0)
 
 
-FUNCTIONS = (plus, minus, times, over, sqrt, sin, cos, tan, exp, log, fabs, sign, floor, whole)
+@njit
+def where(condition, a, b):
+    """Return ``a`` where the condition is above 0, else ``b``."""
+    return complex(a) if condition.real > 0.0 else complex(b)
+
+
+FUNCTIONS = (plus, minus, times, over, sqrt, sin, cos, tan, exp, log, fabs, sign, floor, whole, where)
 _OPERATORS = {ast.Add: "plus", ast.Sub: "minus", ast.Mult: "times", ast.Div: "over"}
 
 

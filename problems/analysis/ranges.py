@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from problems.evaluate.evaluator import Numbers
 from problems.graph.functions import FUNCTIONS
-from problems.graph.nodes import Table
+from problems.graph.tables import Table
 
 Array = NDArray[np.float64]
 

@@ -5,7 +5,8 @@ from math import pi
 
 from problems.analysis.structure import WITHOUT_END, has_kink
 from problems.derive.function import Function, Term
-from problems.graph.nodes import STATE, Node, Table, reachable
+from problems.graph.nodes import STATE, Node, reachable
+from problems.graph.tables import Table
 
 GOLDEN = (5.0**0.5 - 1.0) / 2.0  # multiples of it are far from equal sums
 

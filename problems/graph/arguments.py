@@ -14,8 +14,9 @@ from problems.errors import InputError, shown, unknown
 from problems.graph import sums
 from problems.graph.each import Constants, Each, constants, dot, each, flat_index, place_of, scatter
 from problems.graph.functions import OF_ONE_ARGUMENT
-from problems.graph.nodes import PAR, Condition, Graph, Node, P, Q, T, Table
+from problems.graph.nodes import PAR, Condition, Graph, Node, P, Q, T
 from problems.graph.source_line import line_of_function, line_of_traceback, refuse
+from problems.graph.tables import Table
 
 # Where each parameter lies in the flat vector `par`: offset, and shape.
 Layout = Mapping[str, tuple[int, tuple[int, ...]]]

@@ -14,7 +14,7 @@ from problems import double_double
 from problems.double_double import DD
 
 ONE = Fraction(1)
-SLOW = 10  # operations that take as long to compile as a sine
+SLOW = 3  # operations that take as long to compile as a sine
 _TWO_OVER_SQRT_PI = Fraction(2 / math.sqrt(math.pi))
 _INFINITY = math.inf
 WHOLE = 1.5 * 2.0**52

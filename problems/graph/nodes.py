@@ -18,7 +18,6 @@ products by binary powering, ``x**n = (x**(n//2))**2`` times ``x`` for odd ``n``
 import math
 import numbers
 from collections.abc import Callable, Hashable, Iterable
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, NoReturn
 
@@ -30,6 +29,7 @@ from problems.graph.arithmetic import ARITHMETIC
 from problems.graph.functions import FUNCTIONS
 from problems.graph.loops import Affine, Constants, Loop, Place, Stage, Summands
 from problems.graph.source_line import refuse, users_line
+from problems.graph.tables import Table
 
 T, Q, P, PAR = 1, 2, 4, 8  # what a node depends on: time, positions, momenta, parameters
 STATE = Q | P
@@ -51,45 +51,6 @@ def _ufunc(spelled: str) -> str:
 def _described(value: Any) -> str:
     shape = getattr(value, "shape", None)
     return f"an array of shape {shape}" if shape else f"{value!r:.40}"
-
-
-@dataclass(frozen=True)
-class Table:
-    """A piecewise polynomial of one argument; beyond its ends the outer pieces go on.
-
-    Attributes
-    ----------
-    knots : tuple of float
-        Ascending, n >= 2.
-    rows : tuple of tuple of float
-        The pieces' coefficients in powers of ``x - knots[i]``, highest first: n - 1 pieces, or n, where
-        another one begins at the last knot.
-    extrapolate : bool
-        Whether arguments beyond the ends are asked for, see `problems.analysis.tables`.
-    """
-
-    knots: tuple[float, ...]
-    rows: tuple[tuple[float, ...], ...]
-    extrapolate: bool = False
-
-    def slope(self) -> "Table":
-        """Return the derivative."""
-        rows = tuple(
-            tuple((len(row) - 1 - i) * c for i, c in enumerate(row[:-1])) or (0.0,) for row in self.rows
-        )
-        return Table(self.knots, rows, self.extrapolate)
-
-    def at(self, x: Any) -> Any:
-        """Return the value at a number or an array of any kind, of doubles or of more digits."""
-        leading = np.asarray(getattr(x, "hi", x), dtype=np.float64)
-        place = np.searchsorted(self.knots, leading, side="right") - 1
-        place = np.clip(place, 0, len(self.rows) - 1)
-        rest = x - np.array(self.knots)[place]
-        first, *others = np.array(self.rows).T
-        value = first[place] + 0.0 * rest
-        for coefficient in others:
-            value = value * rest + coefficient[place]
-        return value
 
 
 class Condition:

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from problems.graph.loops import Affine, Constants, Loop, Place, Stage
-from problems.graph.nodes import Graph, Table
+from problems.graph.nodes import Graph
+from problems.graph.tables import Table
 
 _SPACES = ("t", "y", "par")
 

@@ -22,6 +22,7 @@ from problems.derive.jacobian import Jacobian
 from problems.errors import InputError, MissingLibraryError, shown, unknown
 from problems.graph.functions import FUNCTIONS, SLOW
 from problems.graph.nodes import reachable
+from problems.graph.tables import interpolated
 from problems.systems.base import System
 from problems.systems.code_digest import code_digest
 from problems.systems.opaque import Opaque
@@ -33,7 +34,7 @@ from problems.targets.plan import SMALL, make_plan
 
 _WRITERS = {"numpy": numpy_text, "numba": numba_text, "jax": jax_text, "heyoka": heyoka_text}
 BACKENDS = tuple(_WRITERS)
-LONG, PER_SECOND = 3000, 400  # operations of a field of which its writer is told; compiled in a second, about
+LONG, PER_SECOND = 3000, 600  # operations of a field of which its writer is told; compiled in a second, about
 _CALLED = sorted({f.numba.partition("(")[0] for f in FUNCTIONS.values()} - {""})
 _ARRAYS = [name for name in _CALLED if name == "floor" or not hasattr(math, name)]  # math.floor is an integer
 _MATHEMATICS = {name: getattr(np if name in _ARRAYS else math, name) for name in _CALLED}
@@ -42,6 +43,8 @@ _NUMBA_HEAD = f"""from math import {", ".join(name for name in _CALLED if name n
 import numba
 import numpy as np
 from numpy import {", ".join(_ARRAYS)}
+
+from problems.targets.called import room, table, where
 
 """
 
@@ -173,9 +176,9 @@ def numpy_of(function: Function, name: str, *, limit: int | None = SMALL) -> Cal
 def numba_of(function: Function, name: str) -> tuple[str, Callable[..., Any]]:
     """Return the source of such a function for numba, and it as a Python function that numba can compile."""
     emitted = _written(function, name, "numba", SMALL)
-    from problems.targets.room import room  # which loads numba
+    from problems.targets import called  # which loads numba
 
-    namespace: dict[str, Any] = {"np": np, "room": room, **_MATHEMATICS}
+    namespace: dict[str, Any] = {"np": np, **vars(called), **_MATHEMATICS}
     return emitted.text, _executed(emitted, namespace)
 
 
@@ -193,7 +196,7 @@ def _opaque_on_arrays(system: Opaque, t: Any, y: Any, par: Any) -> np.ndarray:
 def _on_arrays(emitted: Source, n_out: int) -> Callable[..., np.ndarray]:
     key = ("numpy", emitted.sha256)
     if key not in _compiled:
-        inner = _executed(emitted, {"np": np, **_SPECIAL})
+        inner = _executed(emitted, {"np": np, "table": partial(interpolated, np), **_SPECIAL})
 
         def evaluate(t: Any, y: Any, par: Any) -> np.ndarray:
             y = np.asarray(y)
@@ -246,10 +249,7 @@ def numba(system: System, quantity: Quantity, *, limit: int | None = SMALL) -> A
             )
         cut = emitted.text.index(f"def {emitted.name}(")
         decorator = '@numba.njit(cache=True, error_model="numpy")\n'
-        head = _NUMBA_HEAD + (
-            "from problems.targets.room import room\n\n" if "room(out" in emitted.text else ""
-        )
-        text = head + emitted.text[:cut] + "\n" + decorator + emitted.text[cut:]
+        text = _NUMBA_HEAD + emitted.text[:cut] + "\n" + decorator + emitted.text[cut:]
         _compiled[key] = getattr(cache.module(text, emitted.name), emitted.name)
     return _compiled[key]
 
@@ -296,7 +296,8 @@ def jax(system: System, quantity: Quantity, *, limit: int | None = SMALL) -> Cal
     key = ("jax", emitted.sha256)
     if key not in _compiled:
         special = {name: getattr(library.scipy.special, name) for name in _SPECIAL}
-        _compiled[key] = _executed(emitted, {"np": np, "jnp": jnp, **special})
+        namespace = {"np": np, "jnp": jnp, "table": partial(interpolated, jnp), **special}
+        _compiled[key] = _executed(emitted, namespace)
     return _compiled[key]
 
 

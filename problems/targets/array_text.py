@@ -17,10 +17,6 @@ class _ArrayPrinter(Printer):
         super().__init__(plan, functions | {"where": library + ".where({} > 0.0, {}, {})"})
         self._library = library
 
-    def find(self, place: str, knots: str, x: str, n: int) -> None:
-        interval = f'{self._library}.searchsorted({knots}, {x}, side="right") - 1'
-        self.line(f"{place} = {self._library}.clip({interval}, 0, {n - 1})")
-
     def _table(self, values: np.ndarray) -> str:
         return self.table(f"np.array({values.tolist()})")
 
@@ -78,7 +74,7 @@ class _ArrayPrinter(Printer):
             self.accumulate(array, self._table(places), values, len(scatter.loop))
 
     def entry(self, name: str, place: str) -> str:
-        return f"{self.array(name)}[{place}].reshape((-1,) + (1,)*(y.ndim - 1))"
+        return f"{name}[{place}].reshape((-1,) + (1,)*(y.ndim - 1))"
 
     # What differs between the two libraries.
     def start(self, array: str, size: int) -> None:
@@ -123,9 +119,6 @@ class _JaxPrinter(_ArrayPrinter):
     def __init__(self, plan: Plan) -> None:
         super().__init__(plan, "jnp", {name: f.jax for name, f in FUNCTIONS.items()})
         self.outputs: dict[int, str] = {}
-
-    def array(self, name: str) -> str:
-        return f"jnp.asarray({name})"
 
     def store(self, place: int, value: str) -> None:
         if self.plan.scatters:

@@ -22,14 +22,13 @@ class _HeyokaPrinter(Printer):
             raise InputError(
                 f"heyoka has no m.{node.op} that is right to all digits; use a method of another library."
             )
+        elif node.op == "table":
+            raise InputError(
+                "m.table is pieces of polynomials, of which a Taylor series sees one only; "
+                "use a method that needs no Taylor series."
+            )
         else:
             super().let(node, index)
-
-    def look_up(self, node: Node) -> None:
-        raise InputError(
-            "m.table is pieces of polynomials, of which a Taylor series sees one only; "
-            "use a method that needs no Taylor series."
-        )
 
     def store(self, place: int, value: str) -> None:
         self.line(f"out[{place}] = {value}")

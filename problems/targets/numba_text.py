@@ -10,7 +10,7 @@ from problems.targets.loops import Nest, Range, Table, nest, ranges
 from problems.targets.plan import Fill, Plan, Scatter
 from problems.targets.printer import Printer, variable
 
-_FUNCTIONS = {name: f.numba for name, f in FUNCTIONS.items()} | {"where": "({1} if {0} > 0.0 else {2})"}
+_FUNCTIONS = {name: f.numba for name, f in FUNCTIONS.items()} | {"where": "where({}, {}, {})"}
 
 
 class _NumbaPrinter(Printer):
@@ -45,19 +45,6 @@ class _NumbaPrinter(Printer):
 
     def store(self, place: int, value: str) -> None:
         self.line(f"out[{place}] = {value}")
-
-    def find(self, place: str, knots: str, x: str, n: int) -> None:
-        for text in (
-            f"{place} = 0",
-            f"above = {n}",
-            f"while above - {place} > 1:",
-            f"    middle = ({place} + above) >> 1",
-            f"    if {knots}[middle] <= {x}:",
-            f"        {place} = middle",
-            "    else:",
-            "        above = middle",
-        ):
-            self.line(text)
 
     def reduce(self, node: Node, loop: Loop, body: Sequence[Node]) -> None:
         # By way of an output not yet in use: the sum is a lane where outputs are lanes.

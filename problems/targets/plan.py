@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from problems.derive.function import Function, LoopTerm, Term
-from problems.graph.functions import FUNCTIONS, SLOW
+from problems.graph.functions import FUNCTIONS
 from problems.graph.loops import Loop, Stage
 from problems.graph.nodes import Graph, Node, reachable
 
@@ -95,8 +95,8 @@ def array_of(stage: Stage) -> str:
     return f"w{stage.id}"
 
 
-COST = {name: function.cost for name, function in FUNCTIONS.items()} | {"table": SLOW}
-LOOP = 25  # additions that take as long to compile as a loop
+LOOP, TABLE = 25, 8  # additions that take as long to compile
+COST = {name: function.cost for name, function in FUNCTIONS.items()} | {"table": TABLE}
 
 
 @dataclass

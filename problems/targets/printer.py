@@ -14,13 +14,11 @@ _PREFIX = {
     "value": "v",
     "summed": "a",  # outputs that a loop adds to, while they are in a variable
     "column": "i",  # of a loop's list of indices
-    "piece": "piece",  # of a table, and the distance from where it begins
-    "rest": "rest",
 }
 """What the variables of each kind are called, before a number.
 
 No two prefixes are the same and none ends in a digit, so that variables of two kinds are never one;
-the names without a number (``t``, ``i``, ``j``, ``k``, ``above``, ``middle``, ``rows``) are none of them.
+the names without a number (``t``, ``i``, ``j``, ``k``, ``rows``) are none of them.
 """
 
 
@@ -124,8 +122,6 @@ class Printer:
             assert index is not None
             name = self.table(f"np.array({constants.values.tolist()!r})")
             self.assign(node, self.entry(name, index(place)))
-        elif node.op == "table":
-            self.look_up(node)
         elif node.op != "const":
             text, level = self._operation(node)
             if self.plan.uses[node.id] == 1 and len(text) < _LONGEST:
@@ -134,35 +130,9 @@ class Printer:
             else:
                 self.assign(node, text)
 
-    def look_up(self, node: Node) -> None:
-        """Print the value of a table: the piece by its place, then Horner's scheme."""
-        table = node.data
-        knots, rows = (
-            self.array(self.table(f"np.array({list(values)!r})"))
-            for values in (table.knots, map(list, table.rows))
-        )
-        x = self.text(node.args[0])
-        number = self._next()
-        place, rest = variable("piece", number), variable("rest", number)
-        self.line(f"{rest} = {x}")
-        self.find(place, knots, rest, len(table.rows))
-        self.line(f"{rest} = {rest} - {knots}[{place}]")
-        text = f"{rows}[{place}, 0]"
-        for power in range(1, len(table.rows[0])):
-            text = f"({text})*{rest} + {rows}[{place}, {power}]"
-        self.assign(node, text)
-
     def entry(self, name: str, place: str) -> str:
         """Return the text of a number of an array, or of one for each term of a loop."""
         return f"{name}[{place}]"
-
-    def array(self, name: str) -> str:
-        """Return the text of a table's array where it is indexed."""
-        return name
-
-    def find(self, place: str, knots: str, x: str, n: int) -> None:
-        """Print the search for the one of n pieces that x is in."""
-        raise NotImplementedError
 
     def waiting(self, node: Node) -> bool:
         """Whether a value's text waits for the one place that uses it."""
@@ -184,6 +154,10 @@ class Printer:
         if known is not None:
             left = self.text(node.args[0], known.level)
             return left + known.text + self.text(node.args[1], known.level + 1), known.level
+        if node.op == "table":
+            parts = (list(node.data.knots), list(map(list, node.data.rows)))
+            arrays = ", ".join(self.table(f"np.array({part!r})") for part in parts)
+            return f"table({arrays}, {self.text(node.args[0])})", LEAF
         name = self._functions[node.op]
         first, *others = node.args
         if others:

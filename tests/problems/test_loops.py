@@ -14,6 +14,7 @@ from integrators import HBVM, integrate
 from problems import Hamiltonian, InputError, Problem, System, VectorField, targets
 from problems.analysis import invariants
 from problems.graph.loops import affine
+from problems.targets import called
 
 RNG = np.random.default_rng(3)
 N = 6
@@ -193,7 +194,7 @@ def y(case):
 def test_loops_have_the_value_of_the_same_formula_in_numpy(case, y, limit):
     system, par, expected = case.system, case.system.pack(), case.plain(y)
     assert targets.numpy(system, "field", limit=limit)(0.0, y, par) == pytest.approx(expected, abs=1e-13)
-    namespace = {"np": np, "room": lambda like, n: np.empty(n), **{f: getattr(np, f) for f in FUNCTIONS}}
+    namespace = {**vars(called), **{f: getattr(np, f) for f in FUNCTIONS}}
     made = targets.source(system, "field", "numba", limit=limit)
     exec(made.text, namespace)  # noqa: S102 -- emitted from a graph
     out = np.empty(system.dim)

@@ -13,6 +13,7 @@ A vector field reads and writes them through the views of `integrators.kernel.si
 import math
 import operator
 from inspect import signature
+from itertools import product
 from typing import Any, cast
 
 import numpy as np
@@ -23,6 +24,7 @@ from numba.extending import models, register_model
 from integrators.kernel.simd import operations
 from integrators.kernel.simd.emit import DOUBLE, INTEGER, llvm_call, splat, vector
 from integrators.kernel.simd.operations import fma, two_sum
+from problems.targets.called import where
 
 # What numba makes of a decorated function has another signature than the function.
 intrinsic = cast(Any, extending.intrinsic)
@@ -77,17 +79,17 @@ def register(function: Any, arity: int, result: Any, emit: Any) -> None:
         return None if count is None else result(count)(*arguments_for(args))
 
     # numba asks the function that types a call how many arguments it takes.
-    typed = (lambda x: resolve(x)) if arity == 1 else (lambda x, y: resolve(x, y))
-    type_callable(function)(lambda context: typed)
+    typed: Any = (lambda x: resolve(x), lambda x, y: resolve(x, y), lambda x, y, z: resolve(x, y, z))
+    type_callable(function)(lambda context: typed[arity - 1])
 
     def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         count = _count(*sig.args)
         assert count is not None
         return emit(builder, *spread_to(builder, sig.args, args, count))
 
-    mixtures = [[Lanes]] if arity == 1 else [[Lanes, Lanes], [Lanes, types.Float], [types.Float, Lanes]]
-    for kinds in mixtures:
-        lower_builtin(function, *kinds)(lower)
+    for kinds in product((Lanes, types.Float), repeat=arity):
+        if Lanes in kinds:
+            lower_builtin(function, *kinds)(lower)
 
 
 def intrinsic_call(name: str) -> Any:
@@ -141,6 +143,14 @@ for _function, _emit in ((np.floor, intrinsic_call("floor")), (np.sign, _sign)):
     lower_builtin(_function, types.float64)(
         lambda context, builder, sig, args, emit=_emit: emit(builder, *args)
     )
+
+
+def _where(builder: Any, condition: Any, a: Any, b: Any) -> Any:
+    zero = splat(builder, ir.Constant(DOUBLE, 0.0), condition.type.count)
+    return builder.select(builder.fcmp_ordered(">", condition, zero), a, b)
+
+
+register(where, 3, Lanes, _where)
 
 
 # --- explicit operations --------------------------------------------------------------------------

@@ -24,7 +24,7 @@ from integrators.kernel.simd.lanes import (
     spread_to,
     type_callable,
 )
-from problems.targets.room import room
+from problems.targets.called import room
 
 
 class Rows(types.Type):

@@ -26,7 +26,7 @@ from integrators.kernel.simd.memory import (
     spread,
 )
 from integrators.kernel.simd.views import as_numbers, as_rows
-from problems.targets.room import room
+from problems.targets.called import room
 
 context = view(Context)
 

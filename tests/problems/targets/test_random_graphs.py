@@ -14,7 +14,7 @@ from problems import Hamiltonian, System, VectorField, targets
 from problems.analysis.invariants import evaluate
 from problems.derive.function import Function
 from problems.derive.jacobian import Jacobian
-from problems.targets import printer
+from problems.targets import called, printer
 
 DIM = 6
 KNOTS, VALUES = [-2.0, -1.0, 0.3, 1.0, 2.0], [0.0, 1.0, -0.5, 0.2, 0.7]
@@ -133,7 +133,7 @@ def on_python(system: System, what: Function | Jacobian, limit: int | None) -> C
     made = targets.source(system, what, "numba", limit=limit)
     namespace: dict[str, Any] = {
         **{name: getattr(math, name) for name in dir(math)},
-        "np": np,
+        **vars(called),
         "sign": np.sign,
     }
     exec(made.text, namespace)  # noqa: S102 -- the text under test
