@@ -1,7 +1,7 @@
 """What generated code calls, for doubles and for whatever other numbers it runs on.
 
-Each is one call, however long it is: branches in the text of a field would be as many blocks, and where there are
-hundreds of them numba and LLVM take minutes.
+Each is one call, however long it is: branches in the text of a field would be as many blocks, and where
+there are hundreds of them numba and LLVM take minutes.
 """
 
 import numpy as np

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from integrators.kernel.native import binary, stages
 from integrators.kernel.simd.lanes import fma, two_sum
 from problems import double_double
+from problems.targets.called import where
 
 any_double = st.floats(width=64)
 moderate = st.floats(-1e100, 1e100, width=64)
@@ -66,6 +67,8 @@ def arithmetic(t, y, par, out):
     out[15] = 7
     out[16] = a * b + c
     out[17] = np.floor(a)
+    out[18] = where(a - c, b, 2.0)
+    out[19] = where(b, c, a)
 
 
 ARITHMETIC = (
@@ -87,6 +90,8 @@ ARITHMETIC = (
     lambda a, b, c: np.full_like(a, 7.0),
     lambda a, b, c: a * b + c,  # two roundings: nothing is contracted
     lambda a, b, c: np.floor(a),
+    lambda a, b, c: np.where(a - c > 0.0, b, 2.0),
+    lambda a, b, c: np.where(b > 0.0, c, a),
 )
 
 
