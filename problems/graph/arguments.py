@@ -265,7 +265,13 @@ class Mathematics:
         ``kind``: ``"cubic"``, SciPy's ``CubicSpline(xs, ys)``; ``"linear"``; ``"previous"``, the value of the
         last point that is not beyond ``x``. An integration beyond the points of a table of the time is
         refused, unless ``extrapolate``.
+
+        ``m.table((x, y), (xs, ys), zs)``, with zs of shape (len(xs), len(ys)), is the same in two dimensions:
+        the sum over the points of the shorter side of their own interpolant times that of the values there,
+        2*min(len(xs), len(ys)) tables.
         """
+        if isinstance(x, tuple | list):
+            return self._table_of_two(x, xs, ys, {"kind": kind, "extrapolate": extrapolate})
         if kind not in _PIECES:
             known = str(unknown("kind of m.table", kind, _PIECES)).rstrip(".")
             refuse(known, "leave it out for a cubic spline")
@@ -283,6 +289,24 @@ class Mathematics:
                 "give as many finite ys as ascending xs, flat lists",
             )
         return self._graph.table(self._graph.node(x), Table(tuple(xs.tolist()), rows, bool(extrapolate)))
+
+    def _table_of_two(self, arguments: Any, points: Any, values: Any, options: dict[str, Any]) -> Node:
+        try:
+            (x, y), (xs, ys), zs = arguments, points, np.asarray(values, dtype=np.float64)
+            if zs.shape != (len(xs), len(ys)):
+                raise ValueError(f"the values have the shape {zs.shape}")
+        except (TypeError, ValueError) as error:
+            refuse(
+                f"m.table cannot use this grid ({error})",
+                "write m.table((x, y), (xs, ys), zs) with zs of shape (len(xs), len(ys))",
+            )
+        if len(xs) < len(ys):
+            x, y, xs, ys, zs = y, x, ys, xs, zs.T
+        products = (
+            self.table(y, ys, own, **options) * self.table(x, xs, column, **options)
+            for own, column in zip(np.eye(len(ys)), zs.T, strict=True)
+        )
+        return sum(products, start=self._graph.const(0.0))
 
     def __getattr__(self, name: str) -> Callable[[Any], Node]:
         if name.startswith("__"):

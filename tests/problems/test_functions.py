@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.interpolate import CubicSpline, interp1d
+from scipy.interpolate import CubicSpline, RectBivariateSpline, interp1d
 from scipy.special import erf, erfc
 
 import problems
@@ -404,6 +404,27 @@ class TestTables:
         widths, means = np.diff(xs), ys[:-1] if kind == "previous" else (ys[1:] + ys[:-1]) / 2
         assert solution.y[-1, 0] == pytest.approx(float(widths @ means), abs=1e-14)  # measured 5e-16
         assert set(xs[1:].tolist()) <= set(solution.t.tolist())
+
+    @pytest.mark.parametrize(("kind", "shape"), [("cubic", (5, 9)), ("cubic", (8, 6)), ("linear", (5, 9))])
+    def test_tables_in_two_dimensions_have_the_values_and_slopes_of_scipys(self, kind, shape):
+        rng = np.random.default_rng(4)
+        xs, ys = (np.cumsum(rng.uniform(0.1, 1.0, n)) for n in shape)
+        zs = rng.uniform(-1.0, 1.0, shape)
+        system = Hamiltonian(lambda q, m: m.table((q[0], q[1]), (xs, ys), zs, kind=kind), dof=2)
+        degree = 3 if kind == "cubic" else 1
+        expected = RectBivariateSpline(xs, ys, zs, kx=degree, ky=degree)
+        at = np.stack([rng.uniform(x[0], x[-1], 20) for x in (xs, ys)])
+        y = np.concatenate([at, np.zeros((2, 20))])
+        values = targets.numpy(system, "hamiltonian")(0.0, y, np.empty(0))[0]
+        assert values == pytest.approx(expected.ev(*at), abs=1e-13)  # measured 5.3e-15
+        if kind == "cubic":
+            slopes = [expected.ev(*at, dx=1), expected.ev(*at, dy=1)]
+            field = targets.numpy(system, "field")(0.0, y, np.empty(0))
+            assert field[2:] == pytest.approx(-np.stack(slopes), abs=1e-12)  # measured 1.5e-14
+
+    def test_another_grid_is_refused(self):
+        with pytest.raises(InputError, match=r"m\.table cannot use this grid .* shape \(3, 2\)"):
+            Hamiltonian(lambda q, m: m.table((q[0], q[1]), ([0, 1], [0, 1, 2]), np.ones((3, 2))), dof=2)
 
     def test_a_previous_value_stays_after_the_last_point(self):
         system = VectorField(

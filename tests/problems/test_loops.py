@@ -8,10 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 import scipy.sparse
-from scipy.integrate import solve_ivp
 
-from integrators import HBVM, integrate
-from problems import Hamiltonian, InputError, Problem, System, VectorField, targets
+from problems import Hamiltonian, InputError, System, VectorField, targets
 from problems.analysis import invariants
 from problems.graph.loops import affine
 from problems.targets import called
@@ -257,29 +255,6 @@ def test_the_code_does_not_grow_with_the_number_of_components():
     small, large = (targets.source(network(n), "field", "numba") for n in (400, 2000))
     assert small.text.count("\n") == large.text.count("\n")
     assert small.cost == large.cost < 100  # measured 63
-
-
-def test_a_network_is_integrated_like_scipy_integrates_it():
-    n = 40
-    rng = np.random.default_rng(1)
-    linked = rng.random((n, n)) < 0.2
-    omega, start = rng.normal(size=n), rng.uniform(-3.0, 3.0, n)
-    near = [np.flatnonzero(row) for row in linked]
-
-    def f(y, par, m):
-        def term(i, js):
-            return par.omega[i] + 0.1 * m.sum(lambda j: m.sin(y[j] - y[i]), js)
-
-        return m.each(term, enumerate(near))
-
-    problem = Problem(VectorField(f, dim=n, parameters={"omega": omega}), y0=start, t_end=5.0)
-    solution = integrate(problem, HBVM(), [5.0])
-
-    def plain(t, y):
-        return omega + 0.1 * (linked * np.sin(y - y[:, np.newaxis])).sum(axis=1)
-
-    reference = solve_ivp(plain, (0.0, 5.0), start, method="DOP853", rtol=1e-13, atol=1e-13).y[:, -1]
-    assert solution.y[-1] == pytest.approx(reference, rel=1e-12, abs=1e-12)  # measured 4e-13
 
 
 def test_a_python_loop_over_thousands_of_cells_is_refused_at_once():
