@@ -5,6 +5,7 @@ import scipy.sparse
 from scipy.integrate import solve_ivp
 
 import problems
+from integrators import HBVM, integrate
 
 
 def brusselator(n):
@@ -137,10 +138,7 @@ def main(sizes=(6, 20, 8, 100)) -> None:
     makers = (brusselator, medical_akzo_nobel, fitzhugh_nagumo, kuramoto)
     for make, n in zip(makers, sizes, strict=True):
         problem, by_hand = make(n)
-        ours, exact = (
-            integrators.integrate(problem, integrators.HBVM(tol=tol), [problem.t_end])
-            for tol in (1e-6, 1e-10)
-        )
+        ours, exact = (integrate(problem, HBVM(tol=tol), [problem.t_end]) for tol in (1e-6, 1e-10))
         options = {"rtol": 1e-6, "atol": 1e-9, "jac_sparsity": pattern(problem.system)}
         bdf = solve_ivp(by_hand, (0.0, problem.t_end), problem.y0, "BDF", **options)
         print(f"{make.__name__}({n}), {problem.system.dim} unknowns")
