@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from problems import double_double
 from problems.graph.functions import WHOLE
-from problems.targets.called import room
+from problems.targets.called import release, room
 
 Numbers = NDArray[np.complex128]
 """Arrays of numbers."""
@@ -238,6 +238,7 @@ def compiled(text: str, name: str) -> Any:
     namespace: dict[str, Any] = {
         "np": np,
         "room": room,
+        "release": release,
         **{function.__name__: function for function in FUNCTIONS},
     }
     exec(compile(tree, "<field>", "exec"), namespace)  # noqa: S102 -- emitted from a graph

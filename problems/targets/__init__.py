@@ -44,7 +44,7 @@ import numba
 import numpy as np
 from numpy import {", ".join(_ARRAYS)}
 
-from problems.targets.called import room, table, where
+from problems.targets.called import release, room, table, where
 
 """
 

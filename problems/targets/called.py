@@ -14,6 +14,10 @@ def room(like, n):
     return np.empty(n, like.dtype)
 
 
+def release(array, n):
+    """Give back what ``room(like, n)`` has returned; Python and numba do so by themselves."""
+
+
 def where(condition, a, b):
     """Return ``a`` where the condition is above 0, else ``b``."""
     return a if condition > 0.0 else b
@@ -37,6 +41,11 @@ def table(knots, rows, x):
 @overload(room)
 def _room(like, n):
     return (lambda like, n: np.empty(n, like.dtype)) if isinstance(like, types.Array) else None
+
+
+@overload(release)
+def _release(array, n):
+    return (lambda array, n: None) if isinstance(array, types.Array) else None
 
 
 @type_callable(where)

@@ -20,6 +20,9 @@ class _NumbaPrinter(Printer):
         self.statements(self.plan.first)
         self._loops(self.plan.zeros, self.plan.scatters)
         self.statements(self.plan.last)
+        for statement in self.plan.first + self.plan.last:
+            if isinstance(statement, Fill):
+                self.line(f"release({statement.name}, {statement.size})")
 
     def _loops(self, zeros: list[int], scatters: Sequence[Scatter]) -> None:
         """Print the loops that fill an array."""

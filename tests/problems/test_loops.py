@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 import scipy.sparse
 
-from problems import Hamiltonian, InputError, System, VectorField, targets
+from integrators import HBVM, integrate
+from problems import Hamiltonian, InputError, Problem, System, VectorField, targets
 from problems.analysis import invariants
 from problems.graph.loops import affine
 from problems.targets import called
@@ -255,6 +256,19 @@ def test_the_code_does_not_grow_with_the_number_of_components():
     small, large = (targets.source(network(n), "field", "numba") for n in (400, 2000))
     assert small.text.count("\n") == large.text.count("\n")
     assert small.cost == large.cost < 100  # measured 63
+
+
+def test_what_loops_store_in_between_needs_no_stack():
+    n = 80_000  # 16 stages of that are 10 MB, and a stack has 8
+    minus = -scipy.sparse.eye_array(n, format="csr")
+
+    def decays(y, m):
+        flow = m.dot(minus, y)
+        return m.each(lambda i: flow[i], range(n))
+
+    problem = Problem(VectorField(decays, dim=n), y0=np.ones(n), t_end=0.1)
+    solution = integrate(problem, HBVM(k=16, s=8, h=0.1), [0.1])
+    assert solution.y[-1] == pytest.approx(np.full(n, np.exp(-0.1)), rel=1e-15)  # measured 1.3e-16
 
 
 def test_a_python_loop_over_thousands_of_cells_is_refused_at_once():

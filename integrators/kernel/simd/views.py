@@ -24,7 +24,7 @@ from integrators.kernel.simd.lanes import (
     spread_to,
     type_callable,
 )
-from problems.targets.called import room
+from problems.targets.called import release, room
 
 
 class Rows(types.Type):
@@ -43,6 +43,10 @@ class Numbers(types.Type):
         super().__init__(name=f"Numbers({stride}, {kind})")
 
 
+ON_STACK = 2**14
+"""Bytes of an array that a function keeps on the stack, of which a thread may have half a megabyte."""
+
+BYTES: Any = ir.IntType(8).as_pointer()
 DOUBLES = Numbers()
 INTEGERS = Numbers(kind=types.int64)
 
@@ -159,11 +163,52 @@ def _type_room(context):
 def _room(context, builder, sig, args):
     like, n = sig.args
     count = like.count if isinstance(like, Rows) else 1
+    size = 8 * count * n.literal_value
+    if size > ON_STACK:
+        return builder.inttoptr(_allocated(builder, size), DOUBLE.as_pointer())
     kind = vector(count) if count > 1 else DOUBLE
     with builder.goto_entry_block():  # once, also in a loop
         memory = builder.alloca(kind, size=ir.Constant(INTEGER, n.literal_value))
     memory.align = _aligned(count)
     return builder.bitcast(memory, DOUBLE.as_pointer())
+
+
+def _of_library(builder: Any, name: str, result: Any, argument: Any) -> Any:
+    known = builder.module.globals.get(name)
+    return known or ir.Function(builder.module, ir.FunctionType(result, [argument]), name)
+
+
+def _allocated(builder: Any, size: int) -> Any:
+    """Return the address of aligned memory, in front of which stands what the C library has returned."""
+    room = ir.Constant(INTEGER, size + ALIGNMENT)
+    pointer = builder.call(_of_library(builder, "malloc", BYTES, INTEGER), [room])
+    first = builder.add(builder.ptrtoint(pointer, INTEGER), ir.Constant(INTEGER, ALIGNMENT))
+    address = builder.and_(first, ir.Constant(INTEGER, -ALIGNMENT))
+    builder.store(pointer, _before(builder, address))
+    return address
+
+
+def _before(builder: Any, address: Any) -> Any:
+    return builder.inttoptr(builder.sub(address, ir.Constant(INTEGER, 8)), BYTES.as_pointer())
+
+
+@type_callable(release)
+def _type_release(context):
+    def typed(memory, n):
+        is_ours = isinstance(memory, Rows | Numbers) and isinstance(n, types.IntegerLiteral)
+        return types.none(memory, n) if is_ours else None
+
+    return typed
+
+
+@lower_builtin(release, Rows, types.IntegerLiteral)
+@lower_builtin(release, Numbers, types.IntegerLiteral)
+def _release(context, builder, sig, args):
+    memory, n = sig.args
+    if 8 * (memory.count if isinstance(memory, Rows) else 1) * n.literal_value > ON_STACK:
+        pointer = builder.load(_before(builder, builder.ptrtoint(args[0], INTEGER)))
+        builder.call(_of_library(builder, "free", ir.VoidType(), BYTES), [pointer])
+    return context.get_dummy_value()
 
 
 @intrinsic(prefer_literal=True)
