@@ -78,7 +78,7 @@ class Control:
         """Set `error`, `quadrature_error`, where blocks are `certain` and `visible`; see `estimate`."""
         from integrators.kernel.step import estimate as rules  # imports numba, which compiling needs anyhow
         from integrators.kernel.step.discontinuities import gap_allowed
-        from integrators.kernel.step.rounding import is_evident
+        from integrators.kernel.step.rounding import is_evident, is_visible
 
         w, b = self.w, self.w.b
         error, quadrature_error, evident_error, evident_quadrature_error = (
@@ -146,7 +146,7 @@ class Control:
                     own = where(slope > 0.0, rules.local_error(self.h, gamma, slope, scale), 0.0)
                     raise_to(worst, own)
                     raise_to(evident, where(is_evident(self.h, gamma, largest), own, 0.0))
-                note(visible, rules.is_visible(self.h, gamma_error, scale))
+                note(visible, is_visible(self.h, gamma_error, scale))
                 note(doubtful, w.get(w.array(Group.slots["gaps"]), start) > most_apart * scale)
 
             w.each(blocks, compare)

@@ -30,16 +30,15 @@ from integrators.kernel.step.fixed_point import evaluate
 from integrators.kernel.step.rounding import (
     beyond_noise,
     is_evident,
+    is_visible,
     known_rounding,
     largest_in_group,
     measure_noise,
     momentum,
     note_sizes,
 )
-from integrators.kernel.step.rule import FIRST_AT_REST, LEAST_BLOCK, RESTART, SMALLEST
+from integrators.kernel.step.rule import FIRST_AT_REST, LEAST_BLOCK, RESTART, SMALLEST, STAGNATION
 
-# Part of a block that rounding accounts for in a step that the fixed-point iteration solves
-ROUNDING_PART = 1e-13
 SLIGHT = 1e-3  # part of the error allowed that a discontinuity counts as where it is negligible
 NARROWEST = 1e-12  # part of the time: shorter steps do not look for a discontinuity any more
 # Times as much is negligible in such a step: next to a zero of a component none might be short enough.
@@ -187,12 +186,6 @@ def local_error(h, gamma, slope, scale):
     return where(error >= 0.0, error, INFINITY)  # of infinite coefficients, a NaN
 
 
-@for_both_widths
-def is_visible(h, gamma, scale):
-    """Whether a coefficient is more than rounding accounts for."""
-    return h * gamma > ROUNDING_PART * scale
-
-
 @compiled
 def note_slow_decay(ctx):
     """Note for each block the largest last coefficient that is as large as at a discontinuity; 0: none."""
@@ -309,7 +302,7 @@ def judge_blocks(ctx):
                 ctx.estimate.gamma_last[b],
                 ctx.estimate.slow_decay[b],
             )
-            if slope > slopes[b] and high <= ROUNDING_PART * steepest:
+            if slope > slopes[b] and high <= STAGNATION * steepest:
                 high = 0.0
             most, most_quadrature_error = INFINITY, INFINITY
             if doubtful and high > 0.0:

@@ -40,6 +40,12 @@ def beyond_noise(gamma, noise):
 
 
 @for_both_widths
+def is_visible(h, gamma, scale):
+    """Whether a coefficient is more than rounding adds in a step that the fixed-point iteration solves."""
+    return h * gamma > STAGNATION * scale
+
+
+@for_both_widths
 def is_evident(h, gamma, largest):
     """Whether a coefficient is more than rounding explains in any field that steps can be solved with.
 

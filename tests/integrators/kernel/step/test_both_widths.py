@@ -14,8 +14,9 @@ from integrators.kernel.simd.emit import ALIGNMENT, INTEGER, text_of, vector
 from integrators.kernel.simd.operations import opposite, where
 from integrators.kernel.simd.values import Value
 from integrators.kernel.step.control import as_errors_allow, as_iterations_allow, bounded, log_of_order
-from integrators.kernel.step.estimate import is_gap, is_visible, judged, local_error, size_in_step
+from integrators.kernel.step.estimate import is_gap, judged, local_error, size_in_step
 from integrators.kernel.step.finish import added, moved_by
+from integrators.kernel.step.rounding import is_visible
 from integrators.kernel.step.size import inverse_sizes, speed_of
 from integrators.kernel.step.stopping import further, judge, residual_at_end, stagnates, untested
 from integrators.kernel.step.sums import multiplied, time_after
