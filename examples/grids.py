@@ -85,7 +85,7 @@ def medical_akzo_nobel(n):
 
 def fitzhugh_nagumo(n):
     """Return waves in n x n cells of an excitable medium, whose boundary is closed."""
-    line = scipy.sparse.diags_array([np.ones(n - 1), np.ones(n - 1)], offsets=[-1, 1])
+    line = scipy.sparse.diags_array([np.ones(n - 1), np.ones(n - 1)], offsets=(-1, 1))
     line = line - scipy.sparse.diags_array(line.sum(axis=0))
     laplace = scipy.sparse.csr_array(0.5 * scipy.sparse.kronsum(line, line))
     x, y = np.meshgrid(np.arange(n), np.arange(n))

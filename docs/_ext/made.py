@@ -18,7 +18,7 @@ FIELDS = {
         "bodies", "long_run", "long_runs", "encounters", "star_cluster", "radial_velocities", "geodesics",
     ),
     "Molecules": ("molecular_dynamics", "molecular_dynamics_sizes", "water"),
-    "Lattices and partial differential equations": ("lattice", "networks"),
+    "Lattices and partial differential equations": ("lattice", "grids"),
     "Mechanics": (
         "own_system", "linkages", "rattle", "mass_matrix", "impacts", "bouncing_ball", "measured_forcing",
         "fit",
