@@ -5,8 +5,12 @@ BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 PIP     = $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-REPORTS ?= sitnikov
-STUDIES ?=
+# Where the results of each study lie; pages are composed of them.
+RESULTS := speed/race speed/automatic speed/work-precision conservation/endure conservation/drift encounters general \
+  many/large many/ensemble paper/paper paper/sitnikov peers
+OWN := chaos random costs
+REPORTS ?= $(RESULTS)
+STUDIES ?= $(OWN)
 
 .PHONY: bench evidence examples pages reports test test-all test-aarch64 docs lint format venv lock clean
 
@@ -16,20 +20,17 @@ bench: venv  ## run Sitnikov through every integrator: results and report in run
 examples: venv  ## the fourteen tasks beside other libraries: writes examples/measured.json and docs/tasks.md
 	$(BIN)/python examples/run_all.py
 
-reports: venv  ## write the committed reports of campaigns, REPORTS="sitnikov drift ...", from runs/; what is missing there runs
-	for name in $(REPORTS); do $(BIN)/hbvm-bench run $$name --report reports/$$name || exit 1; done
+reports: venv  ## write the results REPORTS="speed/race paper/sitnikov" from runs/, and every page; what is missing there runs
+	for place in $(REPORTS); do $(BIN)/hbvm-bench run $${place##*/} --report reports/$$place || exit 1; done
 	for name in $(STUDIES); do $(BIN)/hbvm-bench run reports/$$name --report reports/$$name || exit 1; done
+	$(MAKE) pages
 
-EVIDENCE ?= sitnikov automatic race work-precision endure drift encounters general large ensemble paper peers \
-  reports/chaos reports/random reports/costs
-
-evidence: venv  ## every study and its report, with one version of the code on a quiet machine; goes on where it was stopped
+evidence: venv  ## every study and its page, with one version of the code on a quiet machine; goes on where it was stopped
 	$(BIN)/hbvm-bench doctor
-	for study in $(EVIDENCE); do $(BIN)/hbvm-bench run $$study --report reports/$${study#reports/} || exit 1; done
-	$(BIN)/hbvm-bench report --index reports
+	$(MAKE) reports
 
-pages: venv  ## draw reports/*/index.html from the archives that lie there; nothing is run
-	$(BIN)/hbvm-bench report --pages reports
+pages: venv  ## draw every page and the list of reports from the results that lie there; nothing is run
+	$(BIN)/hbvm-bench report --pages reports --index reports
 
 test: venv  ## the test suite
 	$(BIN)/python -m pytest

@@ -85,7 +85,7 @@ def reports() -> str:
             title, place = found[1], f"../reports/{found[2]}"
             made.append(f"## [{title}]({place})")
         elif found := THUMBNAIL.match(line):
-            picture = f":width: 360px\n:alt: {title}\n:target: reports/{place.split('/')[2]}.html"
+            picture = f":width: 560px\n:alt: {title}\n:target: reports/{place.split('/')[2]}.html"
             made.append(f"```{{image}} ../reports/{found[1]}\n{picture}\n```")
         elif title:  # what is before the first report says how the list itself is made
             made.append(re.sub(r"\[text\]\(\S+\)( · )?", "", line))

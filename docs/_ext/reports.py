@@ -12,6 +12,7 @@ from sphinx.transforms.post_transforms import SphinxPostTransform
 REPORTS = Path(__file__).parents[2] / "reports"
 FIGURE = re.compile(r"^!\[(.*)\]\((figures/[^)]+)\)$", re.MULTILINE)
 WIDE = r"```{{figure}} ../../reports/{name}/\2\n:figclass: wide\n:alt: \1\n```"  # scrolls on a phone
+RESULTS = re.compile(r"\]\(((?:[\w-]+/)?)results\.sqlite\.xz\)")
 TABLES = "rows"
 """The folder of the built site with the reports' own pages, which `hbvm-bench report` draws."""
 
@@ -27,7 +28,7 @@ FILES = ("*.svg", "*.xz")
 
 def texts() -> dict[str, Path]:
     """Return the text of each report by the name of its folder."""
-    return {path.parent.name: path for path in sorted(REPORTS.glob("*/*.md"))}
+    return {path.parent.name: path for path in sorted(REPORTS.glob("*/report.md"))}
 
 
 def _write(app: Sphinx) -> None:
@@ -40,7 +41,7 @@ def _write(app: Sphinx) -> None:
             page = f"../{TABLES}/{name}/index.html"
             title += f'\n\n<a href="{page}">Sortable tables, all figures and all rows of this report</a>'
         text = FIGURE.sub(WIDE.format(name=name), f"{title}\n{rest}")
-        text = text.replace("](results.sqlite.xz)", f"](../../reports/{name}/results.sqlite.xz)")
+        text = RESULTS.sub(rf"](../../reports/{name}/\1results.sqlite.xz)", text)
         page = folder / f"{name}.md"
         if not page.is_file() or page.read_text(encoding="utf-8") != text:  # else Sphinx reads it again
             page.write_text(text, encoding="utf-8")
@@ -66,11 +67,15 @@ def _copy(app: Sphinx, error: Exception | None) -> None:
     for name, path in texts().items():
         folder = Path(app.outdir) / TABLES / name
         folder.mkdir(parents=True, exist_ok=True)
-        for page in path.parent.glob("*.html"):
+        for page in path.parent.rglob("*.html"):  # a report may be composed of others, below it
+            below = page.relative_to(path.parent)
+            (folder / below).parent.mkdir(parents=True, exist_ok=True)
+            ways = WAYS.replace('href="', 'href="' + "../" * (len(below.parts) - 1))
             text = OUT.sub("", page.read_text(encoding="utf-8"), count=1)
-            (folder / page.name).write_text(text.replace(BRAND, WAYS, 1), encoding="utf-8")
-        for file in (file for pattern in FILES for file in path.parent.glob(pattern)):
-            shutil.copyfile(file, folder / file.name)
+            (folder / below).write_text(text.replace(BRAND, ways, 1), encoding="utf-8")
+        for file in (file for pattern in FILES for file in path.parent.rglob(pattern)):
+            (folder / file.relative_to(path.parent)).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(file, folder / file.relative_to(path.parent))
 
 
 def setup(app: Sphinx) -> dict[str, bool]:

@@ -65,9 +65,8 @@ class Stored:
 @cache
 def tables(report: str) -> list[tuple[str, list[str], list[list[str]]]]:
     """Return the tables of a report: the text above, the head, the rows with the label of their group."""
-    (path,) = (TOP / "reports" / report).glob("*.md")
     above, made = "", []
-    lines = path.read_text(encoding="utf-8").split("\n")
+    lines = (TOP / "reports" / report / "report.md").read_text(encoding="utf-8").split("\n")
     for i, line in enumerate(lines):
         if not line.startswith("|"):
             above = line.strip() or above

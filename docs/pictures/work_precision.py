@@ -3,7 +3,6 @@
 python docs/pictures/work_precision.py        writes docs/pictures/work_precision.svg
 """
 
-import re
 import sys
 from pathlib import Path
 
@@ -12,7 +11,9 @@ import matplotlib.pyplot as plt
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE.parent / "_ext"))
-from stored import tables  # noqa: E402 -- beside the extensions
+from first_page import WIDE, frame  # noqa: E402 -- beside the extensions
+
+from hbvm_bench.summaries.points import number  # noqa: E402
 
 LINES = {
     "HBVM": "#0072b2",
@@ -23,20 +24,19 @@ LINES = {
     "IAS15": "#333333",
 }
 LABELS = {"Taylor": "heyoka"}
-UNITS = {"µs": 1e-6, "ms": 1e-3, "s": 1.0}
 ABOVE, BELOW = 1e-4, 1e-13  # position errors that are drawn
 
 
 def settings() -> dict[str, list[tuple[float, float]]]:
     """Return time in seconds and position error of all settings of each method, of the outer Solar System."""
-    head, rows = next((head, rows) for above, head, rows in tables("race") if above.startswith("**All "))
+    cases = frame("speed/race")
+    here = cases[cases.title.str.startswith("Outer") & (cases.processor == WIDE)]
     found: dict[str, list[tuple[float, float]]] = {name: [] for name in LINES}
-    for row in rows:
-        cells = dict(zip(head, row, strict=True))
-        name = cells["setting"].partition("(")[0]
-        time = re.match(r"([\d.]+) (µs|ms|s)", cells["time"])
-        if name in found and time and re.match(r"\d", cells["position"]):
-            found[name].append((float(time[1]) * UNITS[time[2]], float(cells["position"])))
+    for record in here.record:
+        name = record.case.method.partition("(")[0]
+        time, error = (number(record, key) for key in ("warm_seconds", "position_end"))
+        if name in found and time and error:
+            found[name].append((time, error))
     return found
 
 

@@ -174,32 +174,17 @@ def _check_date(name: str, given: str) -> None:
         ) from None
 
 
-class Page(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
-    """What a campaign's page is made of.
+class Page(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """What a campaign's report keeps; what its page is made of says ``page.md`` beside its file.
 
     Attributes
     ----------
-    blocks : list of str
-        Names of blocks, in order; see `hbvm_bench.report.page`. By default those of every campaign.
-    name : str
-        Of the file with the text.
-    lead : list of str
-        Paragraphs at the top; the campaign's description by default.
-    colours : str
-        Whether every method has a colour of its own, or every family.
-    looks : list of str
-        What else has a colour in its figures, see `hbvm_bench.report.figures.style.METHODS`.
     by_processor : bool
         Whether a report keeps the results of several kinds of processor side by side.
     series : list of str
-        Names of the series that lie beside a report; the figures of others are kept as drawn.
+        Names of the series that lie beside a report, beside the curves of its figures.
     """
 
-    blocks: list[str] = []
-    name: Annotated[str, Meta(pattern=rf"^{FILE_NAME}$")] = "report.md"
-    lead: list[str] = []
-    colours: Literal["method", "family"] = "method"
-    looks: list[str] = []
     by_processor: bool = False
     series: list[str] = []
 

@@ -51,7 +51,7 @@ class Campaign(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     grid, limits, timing, checks
         Shared by all cases.
     page : Page
-        Which blocks its page has.
+        What its report keeps.
     computes : str
         What is computed beside the cases, such as ``"./blocks.py:tasks"``: a function that returns
         `hbvm_bench.measure.computation.Task`; see `hbvm_bench.campaign.folder`.

@@ -60,21 +60,20 @@ def doctor(
 
 def _peers(context: typer.Context, rounds: int | None, out: Path | None, as_json: bool) -> None:
     from hbvm_bench.commands.publishing import report_on  # what draws costs seconds to import
-    from hbvm_bench.studies.peers import report
+    from hbvm_bench.studies.peers import blocks
 
     directory = out or Path("runs") / PEERS
     store = carry_out(with_rounds(load(PEERS), rounds), directory, as_typed(context))
     results = report_on([store], directory / "report")
-    run = results.runs[-1]
-    pairs = report.pairs(results, run)
+    pairs = blocks.pairs(results)
     if as_json:
-        terminal.print_json(run_as_json(run.index, run.records))
+        terminal.print_json(run_as_json(results.runs[-1].index, results.runs[-1].records))
     else:
-        terminal.print_table(report.table(pairs))
+        terminal.print_table(blocks.table(pairs))
         for pair in pairs:
             if pair.failed:
                 print(f"{pair.bench.case.method} on {pair.task.problem} did not run: {pair.failed}")
-    if not report.healthy(pairs):
+    if not blocks.healthy(pairs):
         raise typer.Exit(UNHEALTHY)
 
 

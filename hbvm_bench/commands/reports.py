@@ -6,7 +6,6 @@ from typing import Annotated
 
 import typer
 
-from hbvm_bench.campaign.file import STUDY
 from hbvm_bench.store.files import ensure_writable
 from hbvm_bench.store.store import opened
 from problems.errors import InputError
@@ -42,13 +41,14 @@ def report(
         raise InputError("give at least one run, as in runs/sitnikov, or --index DIR, or --pages DIR.")
     if runs:
         from hbvm_bench.commands.publishing import report_on
+        from hbvm_bench.report.page import beside
 
         stores = opened(runs)
         for store in stores:
             store.index()
         target = out or runs[0] / "report"
         ensure_writable(target, keep=False)
-        report_on(stores, target, study or _beside(runs[0]), stderr=False)
+        report_on(stores, target, study or beside(runs[0]), stderr=False)
         if show:
             webbrowser.open((target / "index.html").resolve().as_uri())
     if pages is not None:
@@ -60,11 +60,6 @@ def report(
         from hbvm_bench.report.index import write_index
 
         print(write_index(index))
-
-
-def _beside(run: Path) -> Path | None:
-    """Return the folder of a report that is the folder of its study too; ``None`` for any other."""
-    return run if (run / STUDY).is_file() else None
 
 
 def gallery(

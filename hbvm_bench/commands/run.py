@@ -11,7 +11,7 @@ import msgspec
 import typer
 from msgspec.structs import replace
 
-from hbvm_bench.campaign import folder, own
+from hbvm_bench.campaign import own
 from hbvm_bench.campaign.file import Campaign, Goal, Grid, MethodEntry, ProblemEntry, file_of, load
 from hbvm_bench.campaign.identity import Resolved, make_method
 from hbvm_bench.campaign.shorter import quick_run
@@ -83,12 +83,10 @@ def run(
     campaign = quick_run(campaign) if quick else campaign
     campaign = opened(campaign, name)
     study = None if name is None else file_of(name).parent
-    own_blocks = any(map(folder.is_beside, campaign.page.blocks))
-    if report_to is not None or own_blocks:
-        from hbvm_bench.report.page import find  # what draws costs seconds to import
+    if report_to is not None or (study is not None and (study / "page.md").is_file()):
+        from hbvm_bench.report.page import check  # what draws costs seconds to import
 
-        for block in campaign.page.blocks:
-            find(block, study)
+        check(study)
     if report_to is not None:
         ensure_writable(report_to, keep=False)
     out = out or Path("runs") / (campaign.name + "-quick" * quick)

@@ -17,11 +17,10 @@ VECTORS = (("avx512f", "AVX-512"), ("avx2", "AVX2"), ("avx", "AVX"), ("sse2", "S
 MEASURED = ("vector_bits", "clock_ghz")
 """What `describe` measures: it may differ from one look at a processor to the next."""
 
-# What `kind` says, for under a table; then what the option --avx2 does.
+# What `words` say, for under a table; then what the option --avx2 does.
 COLUMNS = (
-    "Columns: LLVM's name of the processor and the width of its vector arithmetic, where measured; -avx2: "
-    "all that numba compiles (HBVM, Gauss, the forces and right-hand sides handed to REBOUND and SciPy) "
-    "without AVX-512."
+    "Restricted to AVX2: all that numba compiles (HBVM, Gauss, the forces and right-hand sides handed to "
+    "REBOUND and SciPy) without AVX-512."
 )
 AVX2 = (
     "Without AVX-512 in all that numba compiles: HBVM, Gauss, and the forces and right-hand sides handed to "
@@ -90,13 +89,20 @@ def sentence(described: Mapping[str, str | int]) -> str:
         "the code of the other libraries was not"
     )
     return (
-        f"Times and their ratios belong to this kind of processor: {described.get('processor', 'unknown')}"
+        f"Measured on {described.get('processor', 'unknown')}"
         + (f" ({'; '.join(names)})" if names else "")
         + f", {described.get('vector_instructions', 'vector instructions not recorded')}, {width}"
         + (f", {clock} GHz" if clock else "")
         + restricted * bool(described.get("ours_built_for"))
-        + "."
+        + "; ratios differ on other processors."
     )
+
+
+def words(kind: str) -> str:
+    """Return a `kind` of processor for readers: ``"Zen 5, 512-bit, restricted to AVX2"``."""
+    name, *more = kind.split("-")
+    said = {"avx2": "restricted to AVX2", "512bit": "512-bit", "256bit": "256-bit"}
+    return ", ".join([name.replace("znver", "Zen "), *(said.get(word, word) for word in more)])
 
 
 def sentences(described: Iterable[Mapping[str, str | int]]) -> list[str]:

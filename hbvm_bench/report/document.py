@@ -18,7 +18,6 @@ from hbvm_bench.report.figures.style import Look
 from hbvm_bench.summaries.rows import Row
 from hbvm_bench.summaries.table import Table
 
-SHOWN = 4  # figures beside the markdown, and those that are always there
 VERDICTS = {"holds": "confirmed", "partly": "confirmed in part", "no": "not found"}
 
 
@@ -91,7 +90,8 @@ class CaseTable:
 
     columns: Sequence[Metric]
     problems: Sequence[Ranked]  # the section of the i-th, counted from 1, has the anchor ``problem-i``
-    looks: Mapping[str, Look]  # by method
+    looks: Mapping[str, Look]  # by family
+    numbers: Mapping[str, int]  # of the cases, by their ids
 
     @property
     def libraries(self) -> list[str]:
@@ -162,7 +162,6 @@ class Document:
     lead: Sequence[str]  # paragraphs before everything else
     blocks: Sequence[Block]
     looks: Sequence[Look] = ()  # of what has a colour in its figures; no two have one number
-    name: str = "README.md"  # of the file with the markdown
 
     def walk(self) -> Iterator[Block]:
         """Yield every block, in order; what holds blocks comes before them."""
@@ -179,9 +178,9 @@ class Document:
         return [block for block in self.walk() if isinstance(block, Picture)]
 
     @property
-    def shown(self) -> list[Picture]:
-        """The figures that the markdown shows, the first and those ``in_text``; the page has all of them."""
-        return [figure for i, figure in enumerate(self.pictures) if i < SHOWN or figure.in_text]
+    def words(self) -> int:
+        """How many words are read before anything is unfolded."""
+        return sum(map(_words, [self.title, *self.lead, *self.blocks]))
 
     @property
     def failed(self) -> list[Failed]:
@@ -218,3 +217,33 @@ def pieces(text: object) -> list[tuple[str, bool]]:
 def is_call(text: str) -> bool:
     """Whether a cell of a table is the call of a method or of a problem, which is set as code."""
     return re.fullmatch(r"[A-Za-z_]\w*\(.*\)", text) is not None
+
+
+def _words(block: Block) -> int:
+    """Return how many words of a block are read before anything in it is unfolded."""
+    match block:
+        case str():
+            return len(block.split())
+        case Details():
+            return len(block.summary.split())
+        case Section():
+            return len(block.title.split()) + sum(map(_words, block.blocks))
+        case Table():
+            texts = (block.title, *block.head, block.note, *(cell for row in block.rows for cell in row))
+        case CaseTable():
+            rows = (row for problem in block.problems for _, rows in problem.groups for row in rows)
+            texts = (
+                text
+                for row in rows
+                for text in (row.record.case.method, *(cell.text for cell in row.cells.values()), row.remark)
+            )
+        case Claims():
+            claims = (claim for _, _, claims in block.groups for claim in claims)
+            texts = (text for claim in claims for text in (claim.words, claim.paper, claim.here))
+        case Picture():
+            texts = (block.title, block.caption)
+        case Items():
+            texts = block.items
+        case _:
+            texts = (value for value in vars(block).values() if isinstance(value, str))
+    return sum(len(text.split()) for text in texts)

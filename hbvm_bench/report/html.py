@@ -27,10 +27,11 @@ from hbvm_bench.report.document import (
 )
 from hbvm_bench.report.figures.canvas import Picture, inline_svg
 from hbvm_bench.report.figures.style import DARK_NEUTRALS, NEUTRALS, Look
-from hbvm_bench.report.stored import PLACE
+from hbvm_bench.summaries.points import family_of
 from hbvm_bench.summaries.rows import Cell, Row, seconds
 
 HERE = "hbvm_bench.report"
+PLACE = "problem-"  # how the anchors of the sections of problems begin
 READING = "docs/howto/reading_a_report.md"
 SCRIPTS = ("script.js", "table.js", "figures.js")
 TOGETHER, ONE_PAGE = 4, 100  # problems and rows; with more of both each problem has a page of its own
@@ -57,7 +58,7 @@ FITTING = 9  # columns of metrics in a window of 1280 pixels; of more, these wai
 MINOR = ("compile_seconds", "observable_end")
 DIGITS = 16  # of a double: a bar of this many digits is full
 ENLARGED = 1.72  # pixels per point: a figure of a whole line fills the page's column
-LEAST = 1.3  # pixels per point below which a drawing is scrolled rather than made smaller
+LEAST = 0.85  # pixels per point below which a drawing is scrolled rather than made smaller
 
 POWER = re.compile(r"(?<![\w.=])(-?\d+(?:\.\d+)?)e([+-]?\d+)(?![\w.]*\w)")
 MINUS = re.compile(r"(?<![\w.=(])-(?=\d)")
@@ -193,7 +194,7 @@ def templates() -> Environment:
     environment = Environment(
         loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined
     )
-    functions = (printed, words, cell, drawing, chip, call, bar, spread, sort_key, minor_columns)
+    functions = (printed, words, cell, drawing, chip, call, bar, spread, sort_key, minor_columns, family_of)
     environment.globals |= {function.__name__: function for function in functions} | {"verdicts": VERDICTS}
     return environment
 

@@ -14,15 +14,11 @@ from hbvm_bench.summaries.table import Table
 def markdown(document: Document) -> str:
     """Return a document as markdown with relative links to its files."""
     parts = [f"# {words(document.title)}", *map(words, document.lead)]
-    shown = {picture.key for picture in document.shown}
-    return joined([*parts, *(printed(block, shown=shown) for block in document.blocks)]) + "\n"
+    return joined([*parts, *map(printed, document.blocks)]) + "\n"
 
 
-def printed(block: Block, level: int = 2, shown: Collection[str] = ()) -> str:
-    """Return a block as markdown.
-
-    ``level`` is that of the next heading in it; of the figures those whose keys are ``shown`` lie beside it.
-    """
+def printed(block: Block, level: int = 2) -> str:
+    """Return a block as markdown; ``level`` is that of the next heading in it."""
     heading = "#" * level
     match block:
         case str():
@@ -44,19 +40,19 @@ def printed(block: Block, level: int = 2, shown: Collection[str] = ()) -> str:
             links = ", ".join(f"[{path.rpartition('/')[2]}]({path})" for path in block.files)
             return f"{words(block.text)}: {links}."
         case blocks.Links():
-            listed = (f"- [{words(title)}]({place}) {words(text)}" for title, text, place in block.links)
+            listed = (f"- {words(title)} {words(text)}: {code(place)}" for title, text, place in block.links)
             return "\n".join(listed)
         case blocks.Failed():
             return f"**Not made: {words(block.title)}** ({words(block.reason)})"
         case blocks.Details():
-            inner = "\n\n".join(printed(inner_block, level, shown) for inner_block in block.blocks)
+            inner = "\n\n".join(printed(inner_block, level) for inner_block in block.blocks)
             return f"<details>\n<summary>{plain(block.summary)}</summary>\n\n{inner}\n\n</details>"
         case blocks.Section():
             title = words(block.title) + (f": {code(block.code)}" if block.code else "")
             return joined(
                 [
                     f"{heading} {title}",
-                    *(printed(inner_block, level + 1, shown) for inner_block in block.blocks),
+                    *(printed(inner_block, level + 1) for inner_block in block.blocks),
                 ]
             )
         case Table():
@@ -64,11 +60,9 @@ def printed(block: Block, level: int = 2, shown: Collection[str] = ()) -> str:
             table = lined([words(head) for head in block.flat_head], rows, block.words)
             return joined((f"**{words(block.title)}**" * bool(block.title), table, words(block.note)))
         case Picture():
-            if block.key not in shown:
-                return ""
             title = words(block.title)
             image = f"![{title}]({block.file})"
-            return joined((f"{heading} {title}", image, words(block.summary), words(block.caption)))
+            return joined((f"{heading} {title}", image, words(block.caption)))
 
 
 def joined(parts: Iterable[str]) -> str:
@@ -100,7 +94,7 @@ def _results(block: blocks.CaseTable, level: int) -> str:
         for title, rows in problem.groups:
             lines = []
             for row in rows:
-                case, number = row.record.case, str(block.looks[row.record.case.method].number)
+                case, number = row.record.case, str(block.numbers[row.record.id])
                 lines.append(
                     (number, code(case.method), words(case.settings), *row_cells(block.columns, row))
                 )

@@ -1,53 +1,45 @@
-"""The one builder of pages: a campaign names the blocks of its page, and a block is a function of results.
+"""Pages: a template says which blocks stand where, and a block is a function of results.
 
-A name is that of a block in `hbvm_bench.report.campaign`; ``./blocks.py:table`` is the function ``table`` of
-a Python file beside the campaign's.
+The template is ``page.md`` of a study's folder, or the one that ships; see `hbvm_bench.report.template`. The
+name of a block is that of a function in `hbvm_bench.report.blocks`; ``./blocks.py:table`` is the function
+``table`` of a Python file beside the campaign's.
 """
 
-import re
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from importlib import import_module
 from inspect import isfunction
 from pathlib import Path
-from types import ModuleType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hbvm_bench.campaign import folder
-from hbvm_bench.campaign.file import Case, Page, shipped
+from hbvm_bench.campaign.file import STUDY, Case, shipped
 from hbvm_bench.measure import machine, reading
-from hbvm_bench.report.document import Block, Document, attempt
-from hbvm_bench.report.figures.canvas import Picture
+from hbvm_bench.report import template
+from hbvm_bench.report.curves import PREFIX, curves
+from hbvm_bench.report.document import Block, Document
 from hbvm_bench.report.figures.style import Look, looks
-from hbvm_bench.report.stored import pictures
 from hbvm_bench.store.records import Record
-from hbvm_bench.store.store import Store, progress
+from hbvm_bench.store.store import PACKED, Store, progress
 from hbvm_bench.store.stored_run import StoredRun
+from hbvm_bench.summaries import cost_ratio, growth
+from hbvm_bench.summaries import frame as frames
+from hbvm_bench.summaries.frame import Frame
 from hbvm_bench.summaries.points import family_of
 from problems.errors import InputError, unknown
 
 Series = dict[str, NDArray[np.float64]]
 Stores = Sequence[Store]
 Made = Block | Sequence[Block] | None
+BlockMaker = Callable[..., Made]
 
 DRAWN_CASES = 300  # of a larger campaign the first so many are drawn: a figure takes seconds
-HERE, STUDIES = "hbvm_bench.report.campaign", "hbvm_bench.studies"
-DEFAULT = (
-    *(
-        "goals_reached",
-        "best_compilations",
-        "overview_of_many",
-        "what_came_out",
-        "overview_of_one",
-        "problems_in_turn",
-    ),
-    *("fairness", "raw_data", "run_again", "sources"),
-)
-"""The blocks of a campaign that names none."""
+HERE = "hbvm_bench.report.blocks"
+PROPERTY = "Motion"  # what has a colour in figures and is no method: a property of the motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,33 +53,31 @@ class Results:
     records : list of Record
         Of all cases; of one that several runs have, that of the run that got further with it.
     series : dict
-        What is drawn of each case, by its id; empty where a report has figures instead.
-    figures : sequence of (str, str)
-        Of a report; see `Store.figures`.
+        What is drawn of each case, by its id: its curves, and the series that the campaign's page names.
     computed : dict of (Record, dict)
         The computations of a study with what they returned, by their keys.
     study : Path or None
         The folder of the campaign's file, where its own blocks are.
+    place : str
+        The folder of the results as seen from the page; empty where they lie beside it.
     """
 
     runs: list[StoredRun]
     records: list[Record]
     series: dict[str, Series]
-    figures: Sequence[tuple[str, str]] = ()
     computed: dict[str, tuple[Record, Series]] = field(default_factory=dict)
     study: Path | None = None
+    place: str = ""
 
-    @property
-    def page(self) -> Page:
-        """What the campaign says of its page; several campaigns together have the default one."""
-        pages = {run.index.campaign.name: run.index.campaign.page for run in self.runs}
-        return next(iter(pages.values())) if len(pages) == 1 else Page()
+    @cached_property
+    def frame(self) -> Frame:
+        """The results table: see `hbvm_bench.summaries.frame.cases`."""
+        return frames.cases(self.runs)
 
     @cached_property
     def look(self) -> dict[str, Look]:
-        """The colour and marker of each method, or of each family where the page has it so."""
-        name = family_of if self.page.colours == "family" else lambda record: record.case.method
-        return looks([*map(name, self.records), *self.page.looks])
+        """The colour and marker of each family."""
+        return looks([*map(family_of, self.records), PROPERTY])
 
     def missing(self, run: StoredRun) -> list[Case]:
         """Return the cases of a run that have no result yet."""
@@ -102,13 +92,6 @@ class Results:
             runs_of.setdefault(machine.kind(run.machine), []).append(run)
         return dict(sorted(runs_of.items()))
 
-    def drawn(self, place: str) -> list[Picture]:
-        """Return the figures of a section as a report has them."""
-        return pictures(self.figures, place)
-
-
-BlockMaker = Callable[[Results], Made]
-
 
 def find(name: str, study: Path | None = None) -> BlockMaker:
     """Return the block called ``name``; those of a campaign's own are in the folder ``study``.
@@ -120,25 +103,41 @@ def find(name: str, study: Path | None = None) -> BlockMaker:
     """
     if folder.is_beside(name):
         return folder.named(name, study)
-    module, _, function = name.rpartition(":")
-    place = f"{STUDIES}.{module}" if module else HERE
-    known: dict[str, BlockMaker] = {}
-    if re.fullmatch(r"[\w.]+", place):
-        with suppress(ModuleNotFoundError):
-            found = import_module(place)
-            known = {key: item for key, item in vars(found).items() if _is_block(item, found)}
-    if function not in known:
-        prefix = f"{module}:" * bool(module)
-        raise unknown("block of a page", name, [f"{prefix}{key}" for key in known])
-    return known[function]
+    known = {
+        key: item
+        for key, item in vars(import_module(HERE)).items()
+        if isfunction(item) and item.__module__ == HERE and not key.startswith("_")
+    }
+    if name not in known:
+        raise unknown("block of a page", name, known)
+    return known[name]
 
 
-def _is_block(item: object, module: ModuleType) -> bool:
-    """Whether something in a module is one of its own functions for campaigns to name."""
-    return isfunction(item) and item.__module__ == module.__name__ and not item.__name__.startswith("_")
+def page_file(study: Path | None) -> Path:
+    """Return the template of the page of a study: its own, or the one that ships."""
+    own = None if study is None else study / template.NAME
+    return own if own is not None and own.is_file() else template.SHIPPED
 
 
-def gather(stores: Stores, study: Path | None = None) -> Results:
+def beside(place: Path) -> Path | None:
+    """Return a report's folder where it has a page or a study of its own; ``None`` for any other."""
+    return place if any((place / name).is_file() for name in (template.NAME, STUDY)) else None
+
+
+def check(study: Path | None) -> None:
+    """Refuse a page that names a block which is not there, before anything is measured.
+
+    Raises
+    ------
+    problems.errors.InputError
+        With the nearest names.
+    """
+    for name, results in template.named_blocks(page_file(study)):
+        if results is None:
+            find(name, study)
+
+
+def gather(stores: Stores, study: Path | None = None, place: str = "") -> Results:
     """Read the stores of one or more runs.
 
     A case that several runs have is taken from the run that is more complete
@@ -153,9 +152,11 @@ def gather(stores: Stores, study: Path | None = None) -> Results:
     indices = [store.index() for store in stores]
     runs = []
     furthest: dict[str, tuple[Record, Store]] = {}
+    named_of: dict[str, list[str]] = {}
     for store, index in zip(stores, indices, strict=True):
         runs.append(StoredRun(index=index, records=reading.records(store)))
         for record in runs[-1].records:
+            named_of[record.id] = index.campaign.page.series
             if record.id not in furthest or progress(record) > progress(furthest[record.id][0]):
                 furthest[record.id] = (record, store)
     if not furthest:
@@ -170,7 +171,7 @@ def gather(stores: Stores, study: Path | None = None) -> Results:
         if store is not last:
             store.add_known()  # of two runs each may have a reference of its own
             last = store
-        series[key] = reading.drawn(record, store.series(key)) if number < DRAWN_CASES else {}
+        series[key] = _drawn(record, store, named_of[key]) if number < DRAWN_CASES else {}
         records.append(record)
     computed = {
         key: (record, store.series(record.id)) for store in stores for key, record in store.computed().items()
@@ -178,7 +179,18 @@ def gather(stores: Stores, study: Path | None = None) -> Results:
     name = indices[0].campaign.name
     if study is None and name in shipped():
         study = shipped()[name].parent
-    return Results(runs, records, series, stores[0].figures(), computed, study)
+    return Results(runs, records, series, computed, study, place)
+
+
+def _drawn(record: Record, store: Store, named: Sequence[str]) -> Series:
+    """Return the curves of a case, and its series of these names."""
+    arrays = store.series(record.id)
+    whole = (
+        reading.drawn(record, arrays)
+        if named and not any(name.startswith(PREFIX) for name in arrays)
+        else arrays
+    )
+    return {name: whole[name] for name in named if name in whole} | curves(record, arrays)
 
 
 def document(stores: Store | Stores, study: Path | None = None) -> Document:
@@ -188,15 +200,64 @@ def document(stores: Store | Stores, study: Path | None = None) -> Document:
 
 def page_of(results: Results) -> Document:
     """Return the page on results; raises what `find` does."""
-    page, campaigns = results.page, [run.index.campaign for run in results.runs]
-    makers = [(name, partial(find(name, results.study), results)) for name in page.blocks or DEFAULT]
-    single = len({campaign.name for campaign in campaigns}) == 1
-    titles = [campaign.title or campaign.name for campaign in campaigns]
-    together = f"{len(titles)} runs together: {'; '.join(titles)}"
-    return Document(
-        titles[0] if single and (page.by_processor or len(titles) == 1) else together,
-        page.lead or ([campaigns[0].description] if len(campaigns) == 1 else []),
-        attempt(*makers),
-        list(results.look.values()),
-        name=page.name,
+    campaigns = [run.index.campaign for run in results.runs]
+    single = len(campaigns) == 1 or (
+        campaigns[0].page.by_processor and len({campaign.name for campaign in campaigns}) == 1
     )
+    titles = [campaign.title or campaign.name for campaign in campaigns]
+    values = {
+        "title": titles[0] if single else f"{len(titles)} runs together: {'; '.join(titles)}",
+        "description": campaigns[0].description if single else "",
+    }
+    return _made(page_file(results.study if single else None), {"": results}, values)
+
+
+def page_in(place: Path) -> Document:
+    """Return the page of a report's folder, of the results in it and in the folders in it, by their names.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If there are none, and what `gather` and `find` raise.
+    """
+    if (place / PACKED).is_file():
+        return document(Store(place / PACKED).runs(), beside(place))
+    found = {path.parent.name: path for path in sorted(place.glob(f"*/{PACKED}"))}
+    if not found or not (place / template.NAME).is_file():
+        raise InputError(f"the folder {str(place)!r} has no results, or no {template.NAME}.")
+    parts = {name: gather(Store(path).runs(), place=f"{name}/") for name, path in found.items()}
+    return _made(place / template.NAME, parts, {})
+
+
+def _made(path: Path, parts: dict[str, Results], values: dict[str, Any]) -> Document:
+    def results(name: str | None = None) -> Results:
+        if name is None and len(parts) == 1:
+            return next(iter(parts.values()))
+        if name not in parts:
+            raise unknown("results of the page", str(name), parts)
+        return parts[name]
+
+    def make(name: str, of: str | None = None, **options: Any) -> Callable[[], Made]:
+        return partial(find(name, results(of).study), results(of), **options)
+
+    def frame(of: str | None = None) -> Frame:
+        return results(of).frame
+
+    def ratios(of: str | None = None, **options: Any) -> Frame:
+        return cost_ratio.ratios(frame(of), **options)
+
+    def latest(found: Frame) -> Frame:
+        return found[found.processor == found.processor.iloc[-1]]
+
+    def rms(of: str, method: str) -> float:
+        (number,) = frame(of)[frame(of).method == method].id
+        return growth.energy_rms(results(of).series[number])
+
+    def value(name: str, of: str | None = None) -> Any:
+        return find(name, results(of).study)(results(of))
+
+    values = {**values, "frame": frame, "ratios": ratios, "latest": latest, "rms": rms, "value": value}
+    values["strongest"] = cost_ratio.strongest
+    title, lead, blocks = template.rendered(path, make, values)
+    families = dict.fromkeys(family for part in parts.values() for family in part.look)
+    return Document(title, lead, blocks, list(looks(families).values()))

@@ -4,9 +4,7 @@ from collections.abc import Mapping, Sequence
 from datetime import datetime
 
 from hbvm_bench.measure import machine
-from hbvm_bench.report.document import Commands, Section
-from hbvm_bench.store.records import Load, Record
-from hbvm_bench.summaries import outcomes
+from hbvm_bench.store.records import Record
 from hbvm_bench.summaries.table import Table
 from integrators.registry import libraries
 
@@ -17,12 +15,6 @@ def days(records: Sequence[Record]) -> str:
     """Return the days on which the cases ran: ``"2026-11-21"``, ``"2026-11-20 to 2026-11-21"``."""
     days_ = sorted({datetime.fromisoformat(r.finished).date().isoformat() for r in records if r.finished})
     return "" if not days_ else days_[0] if days_[0] == days_[-1] else f"{days_[0]} to {days_[-1]}"
-
-
-def measured_on(day: str, kernel: str, loads: Sequence[Load]) -> str:
-    """Say when something was measured, with which kernel, and beside what other work."""
-    beside = f" {outcomes.other_work(loads)}" if loads else ""
-    return f"Measured on {day} with the kernel {kernel[:DIGITS]}.{beside}"
 
 
 def versions(records: Sequence[Record]) -> dict[str, str]:
@@ -54,23 +46,6 @@ def _each_once(all_: Sequence[Mapping[str, object]], glue: str) -> dict[str, str
         for name, value in mapping.items():
             values_of.setdefault(name, set()).add(str(value))
     return {name: glue.join(sorted(values)) for name, values in sorted(values_of.items())}
-
-
-def again(
-    command: str, measured: str, machine: Mapping[str, object], versions: Mapping[str, object]
-) -> Section:
-    """Return how a study is run again, where it was measured, and with what."""
-    return Section(
-        "Run it again",
-        [
-            Commands(command),
-            "`hbvm-bench report DIRECTORY` draws this report again without running anything. "
-            f"Measured on {measured}.",
-            *facts(machine, versions),
-        ],
-        key="again",
-        nav="Run it again",
-    )
 
 
 def facts(machine: Mapping[str, object], versions: Mapping[str, object]) -> list[Table]:

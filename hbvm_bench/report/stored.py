@@ -1,47 +1,28 @@
-"""What lies beside a report: its rows as they were read, and the figures of arrays that it does not keep.
+"""What lies beside a report: its rows as they were read, and the curves that its figures are drawn from."""
 
-A page made from it has the same tables, sentences and figures; a figure of arrays is drawn anew only from a
-run, which has the arrays.
-"""
-
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
-import msgspec
-
 from hbvm_bench.measure import machine, reading
-from hbvm_bench.report.document import Document, Section
-from hbvm_bench.report.figures.canvas import Picture
+from hbvm_bench.report.page import Results
 from hbvm_bench.store.records import Record
 from hbvm_bench.store.store import Store
 from hbvm_bench.store.stored_run import StoredRun
 from problems.errors import InputError
 
-PLACE = "problem-"  # how the anchors of the sections begin whose figures are of arrays
 
-
-def contents(document: Document, runs: Sequence[StoredRun], stores: Sequence[Store]) -> Store:
-    """Return the store that is kept of the runs that a document is made of, and of its figures."""
+def contents(results: Results, stores: Sequence[Store]) -> Store:
+    """Return the store that is kept of the runs that a page is made of."""
     kept = Store()
-    for number, (store, run) in enumerate(zip(stores, runs, strict=True), 1):
+    for number, (store, run) in enumerate(zip(stores, results.runs, strict=True), 1):
         kept.run = number
         store.add_known()
         kept.write_index(run.index)
-        named = run.index.campaign.page.series
         for record in run.records:
-            arrays = reading.drawn(record, store.series(record.id)) if named else {}
-            kept.save(record, {name: arrays[name] for name in named if name in arrays}, compress=False)
+            kept.save(record, results.series.get(record.id, {}), compress=False)
         for record in store.computed().values():
             kept.save(record, store.series(record.id), compress=False)
-    for section, picture in _drawn(document):
-        kept.keep_figure(section.key, encoded(picture))
     return kept
-
-
-def _drawn(document: Document) -> Iterator[tuple[Section, Picture]]:
-    for part in document.walk():
-        if isinstance(part, Section) and part.key.startswith(PLACE):
-            yield from ((part, block) for block in part.blocks if isinstance(block, Picture))
 
 
 def joined(store: Store, before: Path) -> list[Store]:
@@ -78,13 +59,3 @@ def _with_records(store: Store, records: Sequence[Record]) -> Store:
 
 def _machine(records: Sequence[Record]) -> dict[str, str | int]:
     return StoredRun.machine_of(records)
-
-
-def encoded(picture: Picture) -> str:
-    """Return a figure as JSON."""
-    return msgspec.json.encode(picture, enc_hook=list).decode()
-
-
-def pictures(stored: Sequence[tuple[str, str]], place: str) -> list[Picture]:
-    """Return the figures that were drawn in one section of a page."""
-    return [msgspec.json.decode(text, type=Picture) for where, text in stored if where == place]

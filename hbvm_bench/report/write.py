@@ -8,12 +8,14 @@ from hbvm_bench.report.html import pages
 from hbvm_bench.report.markdown import markdown
 from hbvm_bench.store.files import write_all
 
+TEXT = "report.md"
+
 
 def rendered(document: Document, directory: Path | None = None) -> dict[str, bytes]:
     """Return all files of a document by their path in its directory; pages link to what is around it."""
-    files = {document.name: markdown(document).encode()}
+    files = {TEXT: markdown(document).encode()}
     files |= {name: text.encode() for name, text in pages(document, directory).items()}
-    return {picture.file: picture.svg.encode() for picture in document.shown} | files
+    return {picture.file: picture.svg.encode() for picture in document.pictures} | files
 
 
 def write(document: Document, directory: Path, beside: Mapping[str, bytes] | None = None) -> list[Path]:
@@ -35,4 +37,4 @@ def write(document: Document, directory: Path, beside: Mapping[str, bytes] | Non
     """
     files = {**(beside or {}), **rendered(document, directory)}
     write_all({directory / name: content for name, content in files.items()})
-    return [directory / document.name, directory / "index.html"]
+    return [directory / TEXT, directory / "index.html"]

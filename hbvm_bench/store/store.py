@@ -6,7 +6,6 @@
     results    one row per case: its `Record` as JSON, and the columns that one looks for
     arrays     those of a case by name, compressed ``.npy``; see `hbvm_bench.measure.raw`
     problems   what is known of a problem that does not come with the package, or its reference
-    figures    of a report: those whose arrays it does not keep
 
 The runner alone writes. A row and its arrays are one transaction, so that the end of a process at any moment
 loses and doubles nothing, and a rerun does what is missing. ``runs/NAME`` has ``results.sqlite`` with all
@@ -56,8 +55,6 @@ CREATE TABLE arrays (
     PRIMARY KEY (run, id, name));
 CREATE TABLE problems (run INTEGER NOT NULL, problem TEXT NOT NULL, known TEXT NOT NULL,
     PRIMARY KEY (run, problem));
-CREATE TABLE figures (place TEXT NOT NULL, number INTEGER NOT NULL, picture TEXT NOT NULL,
-    PRIMARY KEY (place, number));
 """
 
 
@@ -251,16 +248,6 @@ class Store:
         for (text,) in self._rows("SELECT known FROM problems WHERE run=?"):
             with suppress(ValueError, LookupError, TypeError):  # damaged: whoever needs it says so
                 own.add_known(decoded(text.encode(), own.Beside))
-
-    def keep_figure(self, place: str, picture: str) -> None:
-        """Store a figure of a part of a report's page."""
-        with self._writing() as database:
-            (count,) = database.execute("SELECT count(*) FROM figures WHERE place=?", (place,)).fetchone()
-            database.execute("INSERT INTO figures VALUES (?,?,?)", (place, count, picture))
-
-    def figures(self) -> list[tuple[str, str]]:
-        """Return the figures of a report's page, each with the part that it stands in."""
-        return self._all("SELECT place, picture FROM figures ORDER BY rowid")
 
     def goals(self) -> list[Goal]:
         """Return the goals of the run that is here, with their dates; none where there is no run."""

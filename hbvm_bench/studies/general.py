@@ -50,14 +50,14 @@ def decay_chain(fast: bool = False) -> Problem:
 
 
 def diffusion(n: int = 10) -> Problem:
-    """Return the diffusion along a row of n places that begins at one end (DETEST C3: 10, C4: 51)."""
+    """Return the heat equation on n points, heated at one end (DETEST C3: 10, C4: 51)."""
 
     def field(y):
         row = [0.0, *(y[i] for i in range(n)), 0.0]
         return [row[i - 1] - 2 * row[i] + row[i + 1] for i in range(1, n + 1)]
 
     system = VectorField(field, dim=n, name=f"diffusion_{n}")
-    return Problem(system, y0=[1.0] + [0.0] * (n - 1), t_end=20.0, title=f"diffusion, {n} places")
+    return Problem(system, y0=[1.0] + [0.0] * (n - 1), t_end=20.0, title=f"heat equation, {n} points")
 
 
 def hires() -> Problem:

@@ -5,21 +5,26 @@ pandas is imported here and nowhere else: whoever integrates does not wait for i
 
 from collections.abc import Callable, Iterator, Sequence
 from statistics import median
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import msgspec
 import numpy as np
 
+from hbvm_bench.campaign.identity import fixed_step, make_method
 from hbvm_bench.campaign.spec import parse_spec
-from hbvm_bench.measure import reading
+from hbvm_bench.measure import machine, reading
 from hbvm_bench.measure.metrics import METRICS
 from hbvm_bench.store.records import Record, Timing, Value
 from hbvm_bench.store.store import Store
-from problems.errors import unknown
+from hbvm_bench.store.stored_run import StoredRun
+from hbvm_bench.summaries import standings
+from hbvm_bench.summaries.points import family_of, is_hbvm_or_gauss
+from problems.errors import InputError, unknown
 
-if TYPE_CHECKING:
-    import pandas as pd
-
+FIXED, ADAPTIVE = "fixed step size", "adaptive step size"
+OURS = "HBVM and Gauss"
+Frame = Any
+"""A data frame of pandas, whose indexing has no types that a checker can follow."""
 FrameRow = dict[str, Any]
 KEY = ("id", "problem", "method")
 INTEGERS = (
@@ -35,7 +40,7 @@ TRUTHS = ("compile_cached",)
 EXCLUDED = "_void"  # how the column ends that says whether a metric must not be compared
 
 
-def frame(stores: Sequence[Store], table: str = "cases") -> "pd.DataFrame":
+def frame(stores: Sequence[Store], table: str = "cases") -> Frame:
     """Return the results of runs as a data frame.
 
     Parameters
@@ -59,7 +64,47 @@ def frame(stores: Sequence[Store], table: str = "cases") -> "pd.DataFrame":
     return framed(rows)
 
 
-def framed(rows: Sequence[FrameRow]) -> "pd.DataFrame":
+def cases(runs: Sequence[StoredRun]) -> Frame:
+    """Return the results table that summaries are functions of: a row for each case of runs, in order.
+
+    Its columns are those of `case`, and ``study``, ``processor`` (see
+    `hbvm_bench.measure.machine.words`), ``place`` (a number for each problem of each run), ``title`` and
+    ``within`` of the problem's entry, ``family``, ``side`` (the family, or HBVM and Gauss together),
+    ``step_size`` (fixed or adaptive), and ``record`` with every sample of time.
+    """
+    rows, records, asked = [], [], []
+    for number, run in enumerate(runs):
+        campaign = run.index.campaign
+        kind = machine.words(machine.kind(run.machine)) if run.records else ""
+        for place, (entry, here) in enumerate(standings.entries(campaign, run.records)):
+            for record in here:
+                family = family_of(record)
+                rows.append(
+                    {
+                        **case(record),
+                        "study": campaign.name,
+                        "processor": kind,
+                        "place": f"{number}/{place}",
+                        "title": standings.title_of(entry),
+                        "family": family,
+                        "side": OURS if is_hbvm_or_gauss(record) else family,
+                        "step_size": step_size_of(record.case.method),
+                    }
+                )
+                records.append(record)
+                asked.append(entry.within)
+    return framed(rows).assign(record=records, within=asked)
+
+
+def step_size_of(method: str) -> str:
+    """Return whether a method, as it prints, has a fixed or an adaptive step size."""
+    try:
+        return FIXED if fixed_step(make_method(method)) else ADAPTIVE
+    except InputError:  # of a plugin or a library that is not here
+        return "step size unknown"
+
+
+def framed(rows: Sequence[FrameRow]) -> Frame:
     """Return rows as a data frame whose columns have the same types in every run."""
     import pandas as pd
 

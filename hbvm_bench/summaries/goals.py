@@ -194,11 +194,12 @@ def ratio_text(ratio: Spread | None) -> str:
     """Write a ratio with its quartiles."""
     if ratio is None:
         return NONE
-    spread = f" ({_number(ratio.low)}–{_number(ratio.high)})" if ratio.low and ratio.high else ""
-    return f"{_number(ratio.median)}×{spread}"
+    spread = f" ({digits(ratio.low)}–{digits(ratio.high)})" if ratio.low and ratio.high else ""
+    return f"{digits(ratio.median)}×{spread}"
 
 
-def _number(value: float) -> str:
+def digits(value: float) -> str:
+    """Write a ratio with three digits."""
     return f"{value:.0f}" if value >= 99.5 else f"{value:.1f}" if value >= 9.95 else f"{value:.2f}"
 
 

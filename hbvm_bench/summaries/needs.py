@@ -1,18 +1,13 @@
-"""Which integrator for which need, in rows of text, and performance profiles over all problems.
+"""Which integrator for which need, in rows of text.
 
 A need is an accuracy and a number to be small. On every problem the settings that reach the
 accuracy are compared, and each family stands for its best; families are then ordered by on
 how many problems they come near the best, and among equals by how far they are from it
-in the median. The profile of a family at tau is the share of the problems on which its
-work is at most tau times the least of all families.
-
-E. D. Dolan, J. J. More, "Benchmarking optimization software with performance profiles",
-Mathematical Programming 91 (2002) 201-213.
+in the median.
 """
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from statistics import median
 from typing import NamedTuple
@@ -26,12 +21,6 @@ SHOWN = 3  # families
 NEAR, NEAR_ERROR, NEAR_MEMORY = 2.0, 10.0, 1.25  # factors to the best cost that count as near it
 _WORSE = {"warm_seconds": "slower", "compile_seconds": "slower", "evaluations": "more", "peak_memory": "more"}
 ROUND_OFF = 1e-15  # an error below this is as good as any other
-ACCURACIES = (
-    {"position_end": 1e-4},
-    {"position_end": 1e-8},
-    {"position_end": 1e-8, "energy_max": 1e-13},
-)
-"""Errors by metric: loose, accurate, and accurate with the energy at round-off."""
 
 
 class Need(NamedTuple):
@@ -116,11 +105,6 @@ def factors(records: Sequence[Record], need: Need) -> Mapping[str, list[float]]:
     Infinite where it does not serve, and NaN where it did not run, or has no such cost (a Taylor method
     counts no evaluations); families that serve nowhere are left out.
     """
-    ratios_of = _of_all(records, need)
-    return {family: ratios for family, ratios in ratios_of.items() if any(map(math.isfinite, ratios))}
-
-
-def _of_all(records: Sequence[Record], need: Need) -> dict[str, list[float]]:
     served: list[dict[str, float]] = []
     families: dict[str, None] = {}
     for here in by_problem(records).values():
@@ -136,7 +120,8 @@ def _of_all(records: Sequence[Record], need: Need) -> dict[str, list[float]]:
         least = min(costs.values(), default=math.inf)
         if math.isfinite(least):
             served.append({family: _factor(cost, least) for family, cost in costs.items()})
-    return {family: [costs.get(family, math.nan) for costs in served] for family in families}
+    ratios_of = {family: [costs.get(family, math.nan) for costs in served] for family in families}
+    return {family: ratios for family, ratios in ratios_of.items() if any(map(math.isfinite, ratios))}
 
 
 def _factor(cost: float, least: float) -> float:
@@ -157,50 +142,3 @@ def _without_drift(record: Record) -> bool:
     growth = clear(record.result.growth.get("energy", ErrorGrowth()))
     slow = growth.kind == "power" and growth.slope_low is not None and growth.slope_low <= 0.5
     return accurate(record, {}) and (growth.kind == "bounded" or slow)
-
-
-@dataclass(frozen=True)
-class Profile:
-    """The profiles of all families for one accuracy."""
-
-    words: str  # the accuracy that was asked for
-    # of each family its work over the least, by problem that any family solves; infinite where it does not,
-    # and NaN where it did not run or has no such work
-    ratios: dict[str, list[float]]
-
-    @property
-    def problems(self) -> int:
-        """On how many problems any family reaches the accuracy."""
-        return len(next(iter(self.ratios.values()), ()))
-
-    def ran(self, family: str) -> int:
-        """Return on how many of these problems a family ran; its share is of them."""
-        return _ran(self.ratios[family])
-
-    def share(self, family: str, tau: float) -> float:
-        """Return the share of its problems on which a family is within a factor ``tau`` of the best."""
-        within = sum(ratio <= tau for ratio in self.ratios[family])
-        return within / self.ran(family) if within else 0.0
-
-    def curve(self, family: str) -> tuple[list[float], list[float]]:
-        """Return the steps of a family's profile: factors, ascending from 1, and shares from there on."""
-        taus = sorted({1.0, *(ratio for ratio in self.ratios[family] if math.isfinite(ratio))})
-        return taus, [self.share(family, tau) for tau in taus]
-
-    def solved(self, family: str) -> int:
-        """Return on how many problems a family reaches the accuracy."""
-        return sum(math.isfinite(ratio) for ratio in self.ratios[family])
-
-    def wins(self, family: str) -> int:
-        """Return on how many problems a family has the least work, the first of several that have it."""
-        best = [min(self.ratios, key=lambda name: self.ratios[name][i] != 1.0) for i in range(self.problems)]
-        return best.count(family)
-
-
-def profile(records: Sequence[Record], within: Mapping[str, float], work: str) -> Profile:
-    """Return the profiles of all families for the errors, by metric, that a setting may have at most.
-
-    A family without the metric of work (a Taylor method has no count of evaluations) has no ratio.
-    """
-    words = ", ".join(f"{key.partition('_')[0]} to {bound:g}" for key, bound in within.items())
-    return Profile(words, _of_all(records, Need("", partial(accurate, within=within), work)))

@@ -165,20 +165,11 @@ def shares(records: Sequence[Record]) -> tuple[str, str]:
 
 def compilations(records: Sequence[Record]) -> list[str]:
     """Return a sentence on how the times of several compilations differ, where there are several."""
-    ratios = sorted(
-        (max(times) / min(times), record.case.method)
-        for record in records
-        if len(times := by_compilation(record)) > 1
-    )
+    ratios = sorted(max(times) / min(times) for record in records if len(times := by_compilation(record)) > 1)
     if not ratios:
         return []
-    count = 1 + max(round_.compilation for round_ in _rounds(records))
-    middle, (most, method) = ratios[len(ratios) // 2][0], ratios[-1]
-    return [
-        f"Compiled {count} times, in fresh processes with empty caches; those that chose a setting did not "
-        f"compare it. Of one setting, the slowest compilation takes {middle:.2f} times as long as the "
-        f"fastest in the median, and at most {most:.2f} times ({method})."
-    ]
+    middle, most = ratios[len(ratios) // 2], ratios[-1]
+    return [f"Scatter between compilations: {middle - 1:.0%} (median), {most - 1:.0%} (largest)."]
 
 
 def by_compilation(record: Record) -> list[float]:
@@ -187,11 +178,6 @@ def by_compilation(record: Record) -> list[float]:
     for round_ in record.timing.rounds if record.timing else ():
         samples_of.setdefault(round_.compilation, []).extend(round_.samples)
     return [median(samples) for samples in samples_of.values() if samples]
-
-
-def busy(records: Sequence[Record]) -> bool:
-    """Whether the machine had so much other work that interleaved times are doubtful."""
-    return any(load.verdict() for load in _loads(records))
 
 
 def _loads(records: Sequence[Record]) -> list[Load]:

@@ -25,7 +25,7 @@ R = TypeVar("R")
 
 GROUPS = {
     "on": "On the requested trajectory",
-    "apart": "At the end with a position error of 10 % or more, as chaotic motion causes eventually",
+    "apart": "Reached the end with a position error of 10 % or more",
     "uncompared": "At the end; without a reference solution, so that the position error is unknown",
     "off": "On another trajectory: the symmetry or the energy was lost; position and time are excluded",
     "ended": "Did not reach the end",

@@ -3,14 +3,12 @@
 Times that chose a setting do not compare it; see `hbvm_bench.measure.timing.chooses`.
 """
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from statistics import median
 
 from hbvm_bench.campaign.file import Campaign, ProblemEntry, name_of
 from hbvm_bench.campaign.identity import make_problem
-from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.campaign.sweep import combinations, fill
 from hbvm_bench.measure.timing import Spread, chooses
 from hbvm_bench.store.records import Record
@@ -100,21 +98,6 @@ def by_round(record: Record) -> dict[int, float]:
         place if round_.number is None else round_.number: median(round_.samples)
         for place, round_ in enumerate(rounds)
     }
-
-
-def untuned(records: Sequence[Record], family: str, errors: Sequence[str]) -> SettingComparison:
-    """Compare a peer at its defaults with the fastest of HBVM and Gauss that is as accurate, in these errors.
-
-    Its defaults are what is called so, or has no arguments.
-    """
-    named = [(record, parse_spec(record.case.method).arguments) for record in among(records, family)]
-    defaults = [record for record, given in named if record.case.settings == "default" or not given]
-    theirs = best(defaults, dict.fromkeys(errors, math.inf))
-    if theirs is None:
-        return SettingComparison(None, None)
-    return compare(
-        best(among(records, ""), no_worse(theirs, dict.fromkeys(errors, 1.0))), theirs, chosen=True
-    )
 
 
 def no_worse(theirs: Record, factors: Mapping[str, float]) -> dict[str, float]:

@@ -8,7 +8,8 @@ from statistics import median
 import numpy as np
 
 from hbvm_bench.measure.computation import Task, split
-from hbvm_bench.report.document import Claim, Items, Maker, Note, Section
+from hbvm_bench.report.document import Claim, Claims, Items, Maker, Note, Section
+from hbvm_bench.report.figures.canvas import Picture
 from hbvm_bench.report.figures.drawn import number
 from hbvm_bench.report.page import Results
 from hbvm_bench.report.parts import Part, PartResults, claims_of, sections_of, tasks_of
@@ -275,7 +276,6 @@ def _exponent_blocks(share: float, results: PartResults) -> list[Maker]:
         return _planets({name: results[f"planets {name}"] for name in orbits.PLANETS}, share)
 
     return [
-        ("the values", lambda: figures.values(_measured(results))),
         ("the times", lambda: _times(_measured(results))),
         ("the planets", planets),
         ("how", lambda: Note(HOW)),
@@ -377,3 +377,15 @@ def _planets(systems: dict[str, orbits.Planets], share: float) -> Table:
         words=(0, 1),
         key="exponents-planets",
     )
+
+
+def values(run: Results) -> Picture:
+    """Return the figure of the exponents with their intervals."""
+    return figures.values(_measured(PartResults(_parts(run)[0], run)))
+
+
+def counts(run: Results) -> dict[str, int]:
+    """Return how many values are known, and how many have which verdict."""
+    (found, *_) = claims(run).blocks
+    assert isinstance(found, Claims)
+    return {"claims": sum(found.counts.values()), **found.counts}

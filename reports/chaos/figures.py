@@ -143,7 +143,6 @@ def sections(
     WIDTH,
     4.0,
     values=True,
-    in_text=True,
 )
 def asteroids(
     figure: Figure, axes_: Sequence[float], eccentricities: Sequence[float], rows: Sequence[Array], turns: int

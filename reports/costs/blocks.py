@@ -9,12 +9,11 @@ from hbvm_bench.campaign.spec import Spec
 from hbvm_bench.measure.computation import Task
 from hbvm_bench.measure.measured import POSITION
 from hbvm_bench.measure.timing import Spread
-from hbvm_bench.report import provenance
-from hbvm_bench.report.document import Items, Maker, Note, Section, attempt
+from hbvm_bench.report.document import Maker, Note, Section, attempt
 from hbvm_bench.report.page import Results
 from hbvm_bench.report.parts import Part, PartResults, sections_of, tasks_of
 from hbvm_bench.store.records import OTHER_WORK, Record
-from hbvm_bench.summaries import compilations, outcomes, standings
+from hbvm_bench.summaries import standings
 from hbvm_bench.summaries.goals import other_work, ratio_text
 from hbvm_bench.summaries.points import family_of
 from hbvm_bench.summaries.rows import format_metric, grouped_by, status_of
@@ -129,16 +128,6 @@ def beside(run: Results) -> list[Section]:
     return sections_of(parts(quick=run.runs[-1].index.campaign.quick), run)
 
 
-def conditions(run: Results) -> Section:
-    """Return the processor, the other work while times were taken, and the compilations."""
-    records = run.records
-    said = [*provenance.processors(records), *outcomes.compilations(records), *outcomes.beside(records)]
-    tables = [compilations.table(member.index.campaign, member.records) for member in run.runs]
-    return Section(
-        "How it was measured", [Items(said), *(table for table in tables if table is not None)], "conditions"
-    )
-
-
 def ratios(run: Results) -> dict[str, list[Ratio]]:
     """Return the settings of each problem beside `DEFAULT`, which comes first, by the problem's title."""
     campaign = run.runs[-1].index.campaign
@@ -148,6 +137,13 @@ def ratios(run: Results) -> dict[str, list[Ratio]]:
         if default is not None:
             members[standings.title_of(entry)] = [Ratio.from_records(record, default) for record in records]
     return members
+
+
+def medians(run: Results) -> dict[str, float]:
+    """Return the median ratio over the problems of each setting but the default."""
+    others = [ratio for problem in ratios(run).values() for ratio in problem if ratio.record != ratio.default]
+    grouped = grouped_by(lambda ratio: ratio.record.case.method, others)
+    return {method: median(r.spread.median for r in here if r.spread) for method, here in grouped.items()}
 
 
 def summary(members: Mapping[str, Sequence[Ratio]]) -> list[Table]:
@@ -225,7 +221,7 @@ def iterations(counted: Mapping[int, Mapping[str, Iterations]], t_end: float) ->
     ]
     return Table(
         "Iterations per step on the discrete nonlinear Schroedinger equation",
-        ("places", *heads),
+        ("sites", *heads),
         rows,
         f"From a rough start to t = {t_end:g}: `reports/costs/lattice.py`.",
         words=(3, 6),

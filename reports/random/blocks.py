@@ -9,11 +9,14 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from hbvm_bench.measure.computation import Task
-from hbvm_bench.report.document import Items, Maker, Note, Section
-from hbvm_bench.report.figures.drawn import WIDTH, Said, drawn
-from hbvm_bench.report.figures.style import INK, MUTED
+from hbvm_bench.report.document import Block, Items, Note
+from hbvm_bench.report.figures.canvas import WIDTH
+from hbvm_bench.report.figures.direct import MOST, End, label
+from hbvm_bench.report.figures.drawn import Said, drawn
+from hbvm_bench.report.figures.over_time import cut
+from hbvm_bench.report.figures.style import MUTED, look
 from hbvm_bench.report.page import Results
-from hbvm_bench.report.parts import Part, PartResults, sections_of, tasks_of
+from hbvm_bench.report.parts import Part, PartResults, tasks_of
 from hbvm_bench.summaries.rows import seconds as in_words
 from hbvm_bench.summaries.table import NONE, Table
 
@@ -53,19 +56,7 @@ def parts(*, quick: bool) -> list[Part]:
         for method in asked(number, methods)
     ]
 
-    def blocks(results: PartResults) -> list[Maker]:
-        outcomes = [outcome_of(results, number, methods) for number in numbers]
-        return [
-            ("how often", lambda: wrong(outcomes, position, "position", POSITION)),
-            ("the picture", lambda: picture(outcomes)),
-            ("the energy", lambda: wrong(outcomes, energy, "energy", ENERGY)),
-            ("the endings", lambda: endings(outcomes)),
-            ("the families", lambda: families(outcomes)),
-            ("what is left out", lambda: left_out(outcomes)),
-            ("how", lambda: Note(HOW)),
-        ]
-
-    return [Part("trials", "Errors behind a success", [*references, *runs], lambda results: [], blocks)]
+    return [Part("trials", "Silent failures", [*references, *runs], lambda results: [], lambda results: [])]
 
 
 def outcome_of(results: PartResults, number: int, methods: Sequence[str]) -> Outcome:
@@ -87,9 +78,37 @@ def tasks(quick: bool) -> list[Task]:
     return tasks_of(parts(quick=quick))
 
 
-def trials(run: Results) -> list[Section]:
-    """Return the results."""
-    return sections_of(parts(quick=run.runs[-1].index.campaign.quick), run)
+def outcomes(run: Results) -> list[Outcome]:
+    """Return what is stored of all problems."""
+    quick = run.runs[-1].index.campaign.quick
+    (part,) = parts(quick=quick)
+    results = PartResults(part, run)
+    numbers, methods = (QUICK, QUICK_METHODS) if quick else (range(COUNT), METHODS)
+    return [outcome_of(results, number, methods) for number in numbers]
+
+
+def positions(run: Results) -> list[Block]:
+    """Return how often positions are wrong behind a success, drawn and as a table."""
+    found = outcomes(run)
+    return [picture(found), wrong(found, position, "position", POSITION)]
+
+
+def details(run: Results) -> list[Block]:
+    """Return the energy, how the integrations ended, the families, and what is left out."""
+    found = outcomes(run)
+    return [
+        wrong(found, energy, "energy", ENERGY),
+        endings(found),
+        families(found),
+        left_out(found),
+        Note(HOW),
+    ]
+
+
+def counts(run: Results) -> dict[str, tuple[int, int]]:
+    """Return for each method how many positions are wrong by more than ten times, and of how many."""
+    found = {method: counted(outcomes(run), method, position) for method in METHODS}
+    return {name: (sum(f > FACTORS[0] for f in factors), total) for name, (total, factors) in found.items()}
 
 
 def position(outcome: Outcome, trial: Trial) -> float:
@@ -159,35 +178,45 @@ def wrong(outcomes: Sequence[Outcome], judge: Judge, quantity: str, note: str) -
     )
 
 
-@drawn("random-factors", "Errors behind a success", WIDTH, 5.0)
+@drawn("random-factors", "Silent failures", WIDTH, 3.3)
 def picture(figure: Figure, outcomes: Sequence[Outcome]) -> Said:
-    """Draw the share of problems by the factor that their error exceeds."""
-    axes = figure.subplots()
-    said = []
-    dashes = ("-", (0, (5, 2)), (0, (1, 1.5)))
-    for i, method in enumerate(METHODS):
-        total, factors = counted(outcomes, method, position)
-        if not factors:
-            continue
-        x = np.sort(np.maximum(factors, 1e-8))
+    """Draw the share of problems by the factor that the error exceeds, of the methods with the largest."""
+    found = {method: counted(outcomes, method, position) for method in METHODS}
+    ranked = sorted(
+        (method for method in METHODS if found[method][1]), key=lambda method: -max(found[method][1])
+    )
+    figure.set_layout_engine("none")
+    axes = figure.add_axes((0.12, 0.16, 0.55, 0.76))
+    axes.set(xscale="log", xlim=(1e-3, 1e5), ylim=(0, 1))
+    axes.set_xlabel("position error / (tolerance × condition number)")
+    axes.set_title("share of problems beyond", fontweight="normal")
+    ends, said = [], []
+    for method in ranked[:MOST]:
+        total, factors = found[method]
+        colour, x = look(method.partition("(")[0])[0], np.sort(np.maximum(factors, 1e-8))
         y = np.arange(len(x), 0, -1) / total
-        axes.step(x, y, where="post", label=method, color=f"C{i % 10}", linestyle=dashes[i // 10], lw=1.3)
-        said.append(f"{method}: {sum(outcome > FACTORS[0] for outcome in factors)} of {total}")
+        dash = (
+            "dashed" if method in ('CVODE(rtol=1e-10, atol=1e-12, method="Adams")', METHODS[8]) else "solid"
+        )
+        axes.step(x, y, where="post", label=method, color=colour, linestyle=dash)
+        ends.append(
+            End(cut(short(method), 24), float(y[np.searchsorted(x, 10.0)] if x[-1] > 10.0 else 0.0), colour)
+        )
+        said.append(f"{method}: {sum(factor > FACTORS[0] for factor in factors)} of {total}")
     for factor in FACTORS:
         axes.axvline(factor, color=MUTED, linewidth=0.8, linestyle=(0, (4, 3)))
-    axes.axvline(1.0, color=INK, linewidth=0.9)
-    axes.set(
-        xscale="log",
-        xlabel="position error / (tolerance × condition number)",
-        ylabel="share of problems beyond",
-        ylim=(0, 1),
-    )
-    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), fontsize="small")
+    label(axes, ends)
     return (
         "Share of the problems in which the method reports success and the error of the position at the end "
-        "is larger than so many times the tolerance times the condition number.",
+        f"is larger than so many times the tolerance times the condition number: the {MOST} methods whose "
+        "largest errors are largest; the table has all. Names stand at the height of 10 times.",
         f"Beyond {FACTORS[0]:g} times: " + "; ".join(said) + ".",
     )
+
+
+def short(method: str) -> str:
+    """Return a method without what all are asked for."""
+    return method.replace("rtol=1e-10, ", "").replace("atol=1e-12, ", "")
 
 
 def endings(outcomes: Sequence[Outcome]) -> Table:

@@ -12,10 +12,7 @@ from hbvm_bench.store.store import PACKED, Store
 from hbvm_bench.store.stored_run import StoredRun
 from problems.errors import InputError
 from tests.hbvm_bench.made_up_run import archived
-from tests.hbvm_bench.studies.race.conftest import made_up as a_race
-from tests.hbvm_bench.studies.race.conftest import save
-from tests.hbvm_bench.studies.test_automatic import made as a_duel
-from tests.hbvm_bench.studies.test_endure import made as an_endurance
+from tests.hbvm_bench.studies import made_up_studies
 
 ENSEMBLE = """
 name = "both"
@@ -72,14 +69,13 @@ def stored_results(directory):
         "versions": {HOSTILE: HOSTILE},
     }
     said["command"] = f"{HOSTILE}\n```\n{HOSTILE}"
-    save(a_race(**said), directory / "race")
-    an_endurance(directory / "endure", years=1e4, starts=3)
-    store = Store(directory / "endure")
+    archived(directory / "race", made_up_studies.race(**said))
+    store = made_up_studies.endurance(directory / "endure", starts=3)
     for record in store.records():
         timing = msgspec.structs.replace(record.timing, machine=said["machine"])
         store.save(msgspec.structs.replace(record, timing=timing, versions=said["versions"]))
     store.write_index(msgspec.structs.replace(store.index(), command=said["command"]))
-    run = a_duel(said["machine"])
+    run = made_up_studies.defaults(said["machine"])
     records = [msgspec.structs.replace(one, versions=said["versions"]) for one in run.records]
     index = msgspec.structs.replace(run.index, command=said["command"])
     archived(directory / "automatic", StoredRun(index=index, records=records))
@@ -94,7 +90,7 @@ def test_a_stored_result_commands_no_terminal_and_leaves_no_markdown(tmp_path, m
     assert "\x1b" not in said
     assert "\u200f" not in said
     assert "<script>alert" not in (tmp_path / "r" / "index.html").read_text(encoding="utf-8")
-    said = (tmp_path / "r" / "README.md").read_text(encoding="utf-8")
+    said = (tmp_path / "r" / "report.md").read_text(encoding="utf-8")
     assert "\x1b" not in said
     for line in said.splitlines():
         assert line.startswith("    ") or not re.search(r"(?<!\\)<script|^```|[^\\`]```", line)
@@ -102,7 +98,7 @@ def test_a_stored_result_commands_no_terminal_and_leaves_no_markdown(tmp_path, m
 
 def test_a_race_whose_problem_is_no_file_name_is_refused(tmp_path):
     """It names the files of the report."""
-    save(a_race(), tmp_path)
+    archived(tmp_path, made_up_studies.race())
     path = tmp_path / PACKED
     content = lzma.decompress(path.read_bytes())
     path.write_bytes(lzma.compress(content.replace(b'"outer_solar_system"', b'"../../../elsewhere"')))

@@ -1,6 +1,5 @@
 """Figures as deterministic SVG, which takes the colours of a page: the one way in which pages are drawn."""
 
-import base64
 import io
 import math
 import re
@@ -24,7 +23,7 @@ P = ParamSpec("P")
 T = TypeVar("T")
 
 FONT = "DejaVu Sans"
-COLOURS = 128  # of an image
+WIDTH = 5.6  # inches: legible in a column of a page and on a phone
 SETTINGS: Any = {
     "svg.fonttype": "none",  # text stays text: it can be read aloud, searched and selected
     "svg.hashsalt": "hbvm-bench",
@@ -65,7 +64,6 @@ class Picture:
     svg: str
     numbers: Table | None = None  # what it shows
     values: bool = False  # whether its colours mean values, so that no theme may brighten them
-    in_text: bool = False  # whether the markdown shows it, however many figures come before it
 
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[\w-]+", self.key):
@@ -106,58 +104,7 @@ def picture(
     # Verdana is as wide as DejaVu Sans, so that labels keep their places where that is missing
     text = text.replace(f"'{FONT}'", f"'{FONT}', Verdana, sans-serif")
     shown = numbers(figure)
-    return Picture(key, title, caption, summary, compact(with_small_images(text)), shown, values=values)
-
-
-def compact(svg: str) -> str:
-    """Return an SVG without what nobody sees: digits below a hundredth of a point, ids, blanks."""
-    svg = re.sub(r'\b(d|x|y|transform)="([^"]*)"', _rounded, svg)
-    svg = re.sub(r' transform="rotate\(-0 [^"]*\)"', "", svg)
-    svg = re.sub(r' id="[A-Za-z0-9.]+_\d+"', "", svg)
-    svg = re.sub(r">\s*\n\s*<", "><", svg)
-    svg = re.sub(r'(?<=style=")[^"]*', lambda style: style[0].replace("; ", ";").replace(": ", ":"), svg)
-    svg = re.sub(r"<g((?: clip-path=\"[^\"]*\")?)>((?:<use [^>]*/>)+)</g>", _with_one_style, svg)
-    families = re.findall(r"font-family:[^;\"]*", svg)
-    if len(set(families)) == 1:
-        svg = svg.replace(f"{families[0]};", "").replace("</style>", f"text{{{families[0]}}}</style>", 1)
-    return svg
-
-
-def _with_one_style(match: re.Match[str]) -> str:
-    """Put the style that all markers of a line share on their group."""
-    styles = set(re.findall(r' style="[^"]*"', match[2]))
-    if len(styles) != 1 or match[2].count(" style=") != match[2].count("<use "):
-        return match[0]
-    style = styles.pop()
-    return f"<g{match[1]}{style}>{match[2].replace(style, '')}</g>"
-
-
-def _rounded(match: re.Match[str]) -> str:
-    value = re.sub(r"-?\d+\.\d+", lambda number: f"{round(float(number[0]), 2):.4g}", match[2])
-    value = " ".join(value.split())
-    if match[1] == "d" and not re.search("[CQ]", value):
-        value = value.replace(" L ", " ")  # what follows the first point of a path is a line anyway
-    return f'{match[1]}="{value}"'
-
-
-def with_small_images(svg: str) -> str:
-    """Return a drawing whose embedded images have palettes: a third of the characters."""
-
-    def smaller(match: re.Match[str]) -> str:
-        before = base64.b64decode(match[0])
-        return base64.b64encode(min(before, small(before), key=len)).decode("ascii")
-
-    return re.sub(r"(?<=data:image/png;base64,)[^\"]+", smaller, svg)
-
-
-def small(png: bytes) -> bytes:
-    """Return an image with a palette of its own: a third of the bytes, and no difference to the eye."""
-    from PIL import Image  # comes with matplotlib
-
-    method = Image.Quantize.FASTOCTREE  # which knows transparency
-    image, buffer = Image.open(io.BytesIO(png)).convert("RGBA"), io.BytesIO()
-    image.quantize(COLOURS, method=method, dither=Image.Dither.NONE).save(buffer, "PNG", optimize=True)
-    return buffer.getvalue()
+    return Picture(key, title, caption, summary, text, shown, values=values)
 
 
 def inline_svg(picture: Picture, colours: Mapping[str, str]) -> str:
@@ -196,7 +143,11 @@ def say(
 def log_axis(
     axes: Axes, which: str, low: int, high: int, *, most: int = 7, zero: float | None = None
 ) -> None:
-    """Give an axis powers of ten from 10^low to 10^high and at most so many labels; 0 stands at ``zero``."""
+    """Give an axis powers of ten from 10^low to 10^high and at most so many labels; 0 stands at ``zero``.
+
+    It is a decade long at least.
+    """
+    high = max(high, low + 1)
     stride = max(1, -(-(high - low) // most))
     ticks = [10.0**power for power in range(low, high + 1) if (power - high) % stride == 0]
     labels = {tick: power_label(tick) for tick in ticks}

@@ -1,7 +1,6 @@
 """What the figures of studies share: colours, sizes, what their sheets have in common."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import wraps
 from typing import Concatenate, ParamSpec
 
@@ -41,12 +40,12 @@ def number(value: float | None, digits: int = 2) -> str:
 
 
 def drawn(
-    key: str, title: str, width: float, height: float, *, values: bool = False, in_text: bool = False
+    key: str, title: str, width: float, height: float, *, values: bool = False
 ) -> Callable[[Callable[Concatenate[Figure, P], Said]], Callable[P, Picture]]:
     """Have a function draw on an empty sheet, of which a picture is made; the same gives the same bytes.
 
     The sheet is ``width`` times ``height`` inches and makes room for its labels; ``values`` says whether
-    colours mean values, ``in_text`` whether the markdown shows it, however many figures come before it.
+    colours mean values.
     """
 
     def decorate(draw: Callable[Concatenate[Figure, P], Said]) -> Callable[P, Picture]:
@@ -56,7 +55,7 @@ def drawn(
             figure = new(width, height)
             figure.set_layout_engine("constrained")
             caption, summary = draw(figure, *args, **kwargs)
-            return replace(picture(figure, key, title, caption, summary, values=values), in_text=in_text)
+            return picture(figure, key, title, caption, summary, values=values)
 
         return draw_picture
 

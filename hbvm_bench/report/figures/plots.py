@@ -5,13 +5,7 @@ from matplotlib.figure import Figure
 
 from hbvm_bench.summaries.table import NONE, Table
 
-HEAD = ("#", "line", "panel", "points", "x from", "to", "y from", "to", "last y")
-BETWEEN = "  "  # the number of a case and its method in a label
-
-
-def named(number: int, method: str) -> str:
-    """Return the label of a case's line."""
-    return f"{number}{BETWEEN}{method}"
+HEAD = ("line", "panel", "points", "x from", "to", "y from", "to", "last y")
 
 
 def numbers(figure: Figure) -> Table | None:
@@ -23,12 +17,10 @@ def numbers(figure: Figure) -> Table | None:
             x, y = (np.asarray(values, float) for values in line.get_data())
             if label.startswith("_") or not x.size:
                 continue
-            number, between, name = label.partition(BETWEEN)
-            who = (number, name) if between else ("", label)
             finite = y[np.isfinite(y)]
             last = f"{finite[-1]:.3g}" if finite.size else NONE
-            rows.append((*who, axes.get_title(loc="left"), str(x.size), *_range(x), *_range(y), last))
-    return Table("", HEAD, rows, words=range(3)) if rows else None
+            rows.append((label, axes.get_title(loc="left"), str(x.size), *_range(x), *_range(y), last))
+    return Table("", HEAD, rows, words=range(2)) if rows else None
 
 
 def _range(values: np.ndarray) -> tuple[str, str]:

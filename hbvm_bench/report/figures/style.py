@@ -1,23 +1,20 @@
-"""One visual language: a method keeps its colour, dash and marker in every figure and table.
+"""One visual language: a family keeps its colour and marker in every figure and table.
 
-Colour and marker tell the family and survive the common kinds of colour blindness;
-shade and dash tell the setting within it, and every case has a number, so that
-nothing rests on colour alone.
+Lines carry their names, so that nothing rests on colour alone.
 """
 
 import colorsys
 import hashlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cache
 
-from hbvm_bench.campaign.spec import parse_spec
-from hbvm_bench.store.records import Record
-from hbvm_bench.summaries.points import by_family
-from hbvm_bench.summaries.rows import grouped_by
+from hbvm_bench.summaries.points import PROJECTION
 
-# Of each method: its colour in the light and in the dark theme, and its marker.
+# Of each family: its colour in the light and in the dark theme, and its marker.
 METHODS = {
     "HBVM": ("#0a58b5", "#62b0ff", "o"),
+    PROJECTION: ("#0a58b5", "#62b0ff", "h"),
     "Gauss": ("#0a8f9c", "#4fd3de", "D"),
     "LineIntegral": ("#7a4a1e", "#e0a46a", "d"),
     "Taylor": ("#c8500a", "#ff9a57", "s"),
@@ -51,8 +48,6 @@ DASHES: tuple[tuple[float, ...], ...] = (
     *((), (6, 2), (2, 1.6), (8, 2, 2, 2)),
     *((5, 1.5, 1.5, 1.5, 1.5, 1.5), (12, 3)),
 )
-IN_A_PANEL = 6  # cases
-
 # Neutral colours of the figures; each is unique so that it can be themed in the page.
 INK = "#1d2430"
 MUTED = "#5c6674"
@@ -71,77 +66,42 @@ DARK_NEUTRALS = {
 
 @dataclass(frozen=True)
 class Look:
-    """How one case looks."""
+    """How a family looks."""
 
-    number: int  # its number in the tables and figures, from 1 in the order of the campaign
+    number: int  # from 1, for the styles of a page
     light: str  # its colour in the two themes
     dark: str
-    dash: tuple[float, ...]  # on-off lengths in points; empty for a solid line
     marker: str  # of matplotlib
 
 
-def looks(methods: Iterable[str]) -> dict[str, Look]:
-    """Return the look of every method by its text or name, counted from 1; the same on every problem."""
-    seen: dict[str, int] = {}
-    taken: set[str] = set()
-    by_method: dict[str, Look] = {}
-    for number, method in enumerate(dict.fromkeys(methods), 1):
-        light, dark, marker = base(parse_spec(method).name)
-        # settings of one colour are told apart by shade and dash, whatever their method's name
-        index = seen[light] = seen.get(light, -1) + 1
-        light, dark = _unique(_shade(light, index, towards=0.0), taken), _shade(dark, index, towards=1.0)
-        by_method[method] = Look(number, light, dark, DASHES[index % len(DASHES)], marker)
-    return by_method
+def looks(families: Iterable[str]) -> dict[str, Look]:
+    """Return the look of every family, which is the same on every page, counted from 1."""
+    return {family: Look(number, *look(family)) for number, family in enumerate(dict.fromkeys(families), 1)}
 
 
-def base(name: str) -> tuple[str, str, str]:
-    """Return the light and dark colour and the marker of a method; unknown names get steady ones."""
-    return METHODS.get(name) or OTHERS[hashlib.sha256(name.encode()).digest()[0] % len(OTHERS)]
+@cache
+def look(family: str) -> tuple[str, str, str]:
+    """Return the light and dark colour and the marker of a family; unknown names get steady ones.
+
+    Families of one library share a hue and differ in its shade.
+    """
+    if family not in METHODS:
+        return OTHERS[hashlib.sha256(family.encode()).digest()[0] % len(OTHERS)]
+    light, dark, marker = METHODS[family]
+    index = [name for name, (colour, *_) in METHODS.items() if colour == light].index(family)
+    return shade(light, index, low=0.16, high=0.46), shade(dark, -index, low=0.6, high=0.9), marker
 
 
-def options(record: Record) -> str:
-    """Return the options of a case's method as short as a legend needs them."""
-    words = []
-    for name, value in parse_spec(record.case.method).arguments.items():
-        if isinstance(value, bool):
-            words.append(name if value else f"no {name}")
-        else:
-            words.append(value if isinstance(value, str) else f"{name}={value}")
-    return ", ".join(words) or "default"
+def shade(colour: str, index: int, *, low: float = 0.16, high: float = 0.46) -> str:
+    """Return the shade of a colour with this number, within bounds of its lightness: 0 is the colour itself.
 
-
-def panels(records: Sequence[Record]) -> list[tuple[str, list[Record]]]:
-    """Divide cases into panels: by library, and by method where a library has more than `IN_A_PANEL`."""
-    groups: list[tuple[str, list[Record]]] = []
-    libraries = grouped_by(lambda record: "hbvm-bench" if record.role == "ours" else record.library, records)
-    for library, members in libraries.items():
-        names = by_family(members)
-        if len(members) <= IN_A_PANEL:
-            groups.append((f"{', '.join(names)} · {library}" if len(names) < 3 else library, members))
-        else:
-            groups += [(f"{name} · {library}", group) for name, group in names.items()]
-    return groups
-
-
-def _shade(colour: str, index: int, *, towards: float) -> str:
-    # alternately deeper and paler, so that neighbours in a legend differ most
+    They are alternately paler and deeper, so that neighbours differ most.
+    """
     if index == 0:
         return colour
     red, green, blue = (int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5))
     hue, lightness, saturation = colorsys.rgb_to_hls(red, green, blue)
-    step = 0.11 * ((index + 1) // 2)
-    lightness += step if (index % 2 == 1) == (towards == 0.0) else -step * 0.8
-    low, high = (0.16, 0.46) if towards == 0.0 else (0.6, 0.9)  # what stands out from the paper
-    lightness = min(max(lightness, low), high)
-    channels = colorsys.hls_to_rgb(hue, lightness, saturation)
+    step = 0.11 * ((abs(index) + 1) // 2)
+    lightness += step if (index % 2 == 1) == (index > 0) else -step * 0.8
+    channels = colorsys.hls_to_rgb(hue, min(max(lightness, low), high), saturation)
     return "#" + "".join(f"{round(255 * channel):02x}" for channel in channels)
-
-
-def _unique(colour: str, taken: set[str]) -> str:
-    # a colour is replaced by a variable of the page, so two cases must not share one
-    value = int(colour[1:], 16)
-    while f"#{value:06x}" in taken or f"#{value:06x}" in NEUTRALS:
-        value = (value + 1) % 2**24
-    unique = f"#{value:06x}"
-    taken.add(unique)
-    return unique

@@ -1,7 +1,8 @@
 """The page on the original paper's experiments, from stored results alone: claim, paper, here."""
 
 from hbvm_bench.measure.computation import Task
-from hbvm_bench.report.document import Section
+from hbvm_bench.report.document import Claims, Section
+from hbvm_bench.report.figures.canvas import Picture
 from hbvm_bench.report.page import Results
 from hbvm_bench.report.parts import claims_of, sections_of, tasks_of
 
@@ -24,3 +25,15 @@ def claims(run: Results) -> Section:
 def experiments(run: Results) -> list[Section]:
     """Return the section of each experiment."""
     return sections_of(PARTS, run)
+
+
+def figure(run: Results) -> Picture:
+    """Return the figure of the distance of the primaries: who keeps the planetoid with the same step."""
+    return sitnikov_part.distances(run)
+
+
+def counts(run: Results) -> dict[str, int]:
+    """Return how many claims there are, and how many have which verdict."""
+    (found, *_) = claims(run).blocks
+    assert isinstance(found, Claims)
+    return {"claims": sum(found.counts.values()), **found.counts}

@@ -11,10 +11,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator
 
 from hbvm_bench.measure.computation import Task, each, split
+from hbvm_bench.report.curves import envelope
 from hbvm_bench.report.document import Claim, Maker
 from hbvm_bench.report.figures.canvas import log_axis, power_label, say
 from hbvm_bench.report.figures.drawn import COLOURS, WIDTH, Said, drawn, heat, legend_above, number
-from hbvm_bench.report.figures.over_time import envelope
 from hbvm_bench.report.figures.style import INK, MUTED, PAPER
 from hbvm_bench.report.parts import Part, PartResults
 from hbvm_bench.summaries.table import Table
@@ -275,7 +275,11 @@ def fates(figure: Figure, times: Mapping[str, Sequence[float | None]]) -> Said:
     for family, values in times.items():
         gone, method = _times(values), METHODS[family]
         share = 1 - np.arange(len(gone) + 1) / len(values)
-        look = {"color": COLOURS[family], "linewidth": 1.6, "label": f"{method}, {len(values)} starts"}
+        look = {
+            "color": COLOURS[family],
+            "linewidth": 1.6,
+            "label": f"{method}, {len(values)} initial conditions",
+        }
         axes.step([0, *gone, T_END], [*share, share[-1]], where="post", **look)
         summary.append(f"{method}: {len(gone)} of {len(values)} orbits leave")
     axes.axvline(experiment.PRINTED, color=MUTED, linewidth=0.9, linestyle=(0, (4, 3)))

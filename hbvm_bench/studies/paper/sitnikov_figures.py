@@ -7,9 +7,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from hbvm_bench.report.curves import envelope
 from hbvm_bench.report.figures.canvas import log_axis
 from hbvm_bench.report.figures.drawn import COLOURS, WIDTH, Said, drawn
-from hbvm_bench.report.figures.over_time import envelope
 from hbvm_bench.report.figures.style import INK, MUTED, TRUTH
 from integrators.protocol import Array
 

@@ -8,7 +8,9 @@ import numpy as np
 
 from hbvm_bench.measure.computation import Task, each, split
 from hbvm_bench.report.document import Claim, Maker
+from hbvm_bench.report.figures.canvas import Picture
 from hbvm_bench.report.figures.drawn import number
+from hbvm_bench.report.page import Results
 from hbvm_bench.report.parts import Part, PartResults
 from hbvm_bench.store.records import Record, Value
 from hbvm_bench.summaries.rows import group_of, status_of
@@ -35,6 +37,11 @@ IN_BOUNDS = 1.02  # of the true amplitude; 1.003
 ROUND_OFF = 1e-12  # Gauss's angular momentum 1.9e-15; the primaries' plane 3.7e-3, reference 3.8e-3
 WITH_THE_ORDER = 10.0  # times as much turning at h = 1/2 as at 1/8; 202
 CRITICAL = 0.725  # the paper's critical eccentricity
+
+
+def distances(run: Results) -> Picture:
+    """Return the figure of the distance of the primaries under either method."""
+    return figures.distances(PartResults(PART, run)["orbits"])
 
 
 def _runs() -> list[Task]:

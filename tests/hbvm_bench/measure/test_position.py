@@ -9,7 +9,6 @@ from hbvm_bench.measure.measured import POSITION, position_error
 from hbvm_bench.measure.metrics import METRICS
 from hbvm_bench.reference.solutions import Reference
 from hbvm_bench.report import words
-from hbvm_bench.studies.race import report
 
 
 def off(problem, away):
@@ -50,4 +49,3 @@ def test_every_page_says_what_it_is_relative_to():
     assert POSITION in METRICS["position_end"].description
     assert METRICS["position_end"].unit == METRICS["position_max"].unit == "relative"
     assert sum(POSITION in rule for rule in words.RULES) == 1
-    assert report.RULES_TEXT.count("{position}") == 1

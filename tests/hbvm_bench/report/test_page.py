@@ -1,17 +1,24 @@
-"""A campaign names the blocks of its page, and a block is a function of results."""
+"""A page is a template that says which blocks stand where, and a block is a function of results."""
 
+import re
 from pathlib import Path
 
 import pytest
-from msgspec.structs import replace
 
-from hbvm_bench.campaign.file import Page, load, parse, shipped
+from hbvm_bench.campaign.file import STUDY, parse, shipped
 from hbvm_bench.cli import main
-from hbvm_bench.report import markdown
-from hbvm_bench.report.page import DEFAULT, document, find
+from hbvm_bench.report import markdown, template
+from hbvm_bench.report.document import Details, Links, Note, Picture, Section
+from hbvm_bench.report.page import check, document, find, page_file, page_in
+from hbvm_bench.report.template import NAME, parsed
+from hbvm_bench.report.write import TEXT
 from hbvm_bench.store.store import Store
 from problems.errors import InputError, UnknownNameError
 from tests.hbvm_bench import made_up_run
+
+REPORTS = Path(__file__).parents[3] / "reports"
+COMMITTED = sorted(path.parent.name for path in REPORTS.glob(f"*/{TEXT}"))
+MOST_WORDS = 5000  # before anything is unfolded; measured 334 to 1,367
 
 
 @pytest.fixture
@@ -19,30 +26,33 @@ def store(tmp_path, undrawn):
     return made_up_run.write(Store(tmp_path / "run"), ["pendulum(p=1.0)"], 3)
 
 
-def with_page(store, **said):
-    index = store.index()
-    campaign = replace(index.campaign, page=Page(**said))
-    store.write_index(replace(index, campaign=campaign))
-    return document(store)
+def made(folder, text, store):
+    (folder / NAME).write_text(text, encoding="utf-8")
+    return document(store, folder)
 
 
-def test_every_shipped_campaign_names_blocks_that_are_there():
-    named = {(name, path.parent) for path in shipped().values() for name in load(str(path)).page.blocks}
-    assert {"race.report:ratios", "./blocks.py:claims"} <= {name for name, _ in named}
-    for name, folder in (*named, *((name, None) for name in DEFAULT)):
-        assert callable(find(name, folder))
+def test_every_page_that_comes_with_the_package_or_lies_in_the_reports_names_blocks_that_are_there():
+    folders = {path.parent for path in shipped().values()} | {REPORTS / name for name in COMMITTED}
+    named = {
+        (name, results) for folder in folders for name, results in template.named_blocks(page_file(folder))
+    }
+    assert {("./blocks.py:claims", "paper"), ("cost_ratio", "race"), ("cost_ratio", None)} <= named
+    for folder in folders:
+        check(folder)
+    for name in {name for name, _ in named if not name.startswith("./")}:
+        assert callable(find(name))
 
 
 def test_a_campaign_has_blocks_of_its_own_beside_its_file(store, tmp_path):
     """What a file beside it names is run where its folder is given, and refused in a sentence elsewhere."""
-    (tmp_path / "rows.py").write_text("def count(results):\n    return len(results.records)\n")
+    (tmp_path / "rows.py").write_text("def count(results):\n    return len(results.frame)\n")
     (tmp_path / "blocks.py").write_text(
-        "from .rows import count\n\n\ndef table(results):\n    return f'{count(results)} cases.'\n"
+        "from .rows import count\n\n\ndef table(results, words='cases'):\n"
+        "    return f'{count(results)} {words}.'\n"
     )
-    index = store.index()
-    page_ = Page(blocks=["./blocks.py:table"])
-    store.write_index(replace(index, campaign=replace(index.campaign, page=page_)))
-    assert "3 cases." in markdown.markdown(document(store, tmp_path))
+    text = '# T\n\n{{ block("./blocks.py:table") }} Of {{ value("./blocks.py:table") }}\n\n'
+    text += '{{ block("./blocks.py:table", words="rows") }}\n'
+    assert markdown.markdown(made(tmp_path, text, store)) == "# T\n\n3 cases. Of 3 cases.\n\n3 rows.\n"
     with pytest.raises(InputError, match="--study FOLDER"):
         find("./blocks.py:table")
     for name, why in (("./blocks.py:tables", "did you mean"), ("./block.py:table", "no file block.py")):
@@ -52,56 +62,101 @@ def test_a_campaign_has_blocks_of_its_own_beside_its_file(store, tmp_path):
         find("./../blocks.py:table", tmp_path)
 
 
-def test_a_page_has_the_blocks_that_its_campaign_names_in_this_order(store):
-    made = with_page(store, blocks=["sources", "what_came_out"], name="text.md", lead=["Two blocks."])
-    assert made.name == "text.md"
-    text = markdown.markdown(made)
-    assert text.startswith("# A large campaign\n\nTwo blocks.\n\n## Sources")
-    assert text.index("## Sources") < text.index("## Results")
-    assert "Fairness" not in text
-
-
-def test_a_block_that_is_not_there_is_refused_before_anything_is_measured(tmp_path, capsys):
-    (tmp_path / "blocks.py").write_text("def table(results):\n    return []\n")
-    (tmp_path / "study.toml").write_text(
-        'name = "mine"\nproblems = ["kepler()"]\n[page]\nblocks = ["./blocks.py:tables"]\n'
-        '[[methods]]\nuse = "HBVM()"\n'
+def test_a_page_has_what_its_template_says_in_this_order(store, tmp_path):
+    text = (
+        '# Mine\n\nTwo {{ frame().family.nunique() }}.\n\n{{ block("sources") }}\n{{ block("all_cases") }}\n'
     )
+    said = markdown.markdown(made(tmp_path, text, store))
+    assert said.startswith("# Mine\n\nTwo 3.\n\n## Sources")
+    assert said.index("## Sources") < said.index("| # | method")
+    assert "Fairness" not in said
+
+
+def test_markdown_of_a_template_is_blocks():
+    text = (
+        "# T\n\nLead.\n\n## A part\n\nWords of it\nin lines.\n### Below\n- one\n- two\n\n> small\n> print\n\n"
+        "<details><summary>More</summary>\n## Inside\n\nText\n\n</details>\n\n"
+        "## Last\n\n- [A](a.html) page\n\n    make it\n"
+    )
+    title, lead, blocks = parsed(text, [])
+    assert (title, lead) == ("T", ["Lead."])
+    part, last = blocks
+    assert isinstance(part, Section)
+    assert isinstance(last, Section)
+    assert [part.title, part.key, part.nav, part.blocks[0]] == [
+        "A part",
+        "a-part",
+        "A part",
+        "Words of it\nin lines.",
+    ]
+    below = part.blocks[1]
+    assert isinstance(below, Section)
+    items, note, folded = below.blocks
+    assert isinstance(folded, Details)
+    assert (items.items, note) == (["one", "two"], Note("small print"))
+    assert [(block.title, block.blocks) for block in folded.blocks] == [("Inside", ["Text"])]
+    assert last.blocks[0] == Links([("A", "page", "a.html")])
+    assert last.blocks[1].text == "make it"
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("{{ nothing }}", "'nothing' is undefined"),
+        ("{% for %}", "cannot read the page|cannot be made"),
+        ('{{ block("sources", "elsewhere") }}', "results of the page 'elsewhere'"),
+    ],
+)
+def test_a_template_that_cannot_be_made_is_refused_in_a_sentence(store, tmp_path, text, why):
+    with pytest.raises(InputError, match=why):
+        made(tmp_path, text, store)
+
+
+@pytest.mark.parametrize(
+    ("block", "why"), [("./blocks.py:tables", "did you mean 'table'"), ("what_came_in", "what_came_out")]
+)
+def test_a_block_that_is_not_there_is_refused_before_anything_is_measured(tmp_path, capsys, block, why):
+    (tmp_path / "blocks.py").write_text("def table(results):\n    return []\n")
+    (tmp_path / NAME).write_text(f'{{{{ block("{block}") }}}}')
+    (tmp_path / STUDY).write_text('name = "mine"\nproblems = ["kepler()"]\n[[methods]]\nuse = "HBVM()"\n')
     assert main(["run", str(tmp_path), "--out", str(tmp_path / "run")]) == 2
-    assert "did you mean 'table'" in capsys.readouterr().err
+    assert why in capsys.readouterr().err
     assert not (tmp_path / "run").exists()
 
 
 @pytest.mark.parametrize("name", ["what_came_in", "race.report:ratio", "nosuch:block", "../x:y", "os:system"])
-def test_an_unknown_block_is_refused_with_the_nearest_names(store, name):
+def test_an_unknown_block_is_refused_with_the_nearest_names(name):
     with pytest.raises(UnknownNameError, match="block of a page"):
-        with_page(store, blocks=[name])
+        find(name)
 
 
 @pytest.mark.parametrize(
     ("said", "why"),
-    [('blocs = ["sources"]', "blocs"), ('name = "../x"', "page.name"), ("colours = 1", "page")],
+    [('blocks = ["sources"]', "blocks"), ('name = "x"', "name"), ("by_processor = 1", "page")],
 )
-def test_a_page_that_is_written_wrong_is_refused(said, why):
-    text = (
-        f'name = "x"\nproblems = ["pendulum()"]\nmethods = [{{ use = "Gauss(s=2, h=0.1)" }}]\n[page]\n{said}'
-    )
+def test_a_page_that_cannot_be_is_refused_where_the_campaign_is_read(said, why):
+    text = f'name = "x"\nproblems = ["kepler()"]\n[page]\n{said}\n[[methods]]\nuse = "HBVM()"\n'
     with pytest.raises(InputError, match=why):
         parse(text)
 
 
-def test_another_page_of_a_run_integrates_nothing(toys, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    text = (
-        'name = "x"\nproblems = ["sitnikov(t_end=1.0)"]\nmethods = [{ use = "Waving(h=0.3)" }]\n'
-        "[grid]\ncount = 4\n[timing]\nrounds = 0\n"
-    )
-    for more in ("", '[page]\nblocks = ["sources"]\n'):
-        Path("x.toml").write_text(text + more)
-        assert main(["run", "x.toml", "--report", "r"]) == 0
-    assert "1, 1 already there" in capsys.readouterr().err
-    Path("x.toml").write_text(text + '[page]\nblocks = ["source"]\n')
-    assert main(["run", "x.toml", "--out", "nothing", "--report", "r"]) == 2
-    assert "unknown block of a page 'source'; did you mean 'sources'" in capsys.readouterr().err
-    assert not Path("nothing").exists()
-    assert "## Results" not in Path("r/report.md").read_text(encoding="utf-8")
+def test_the_list_of_reports_is_in_the_order_of_its_template():
+    listed = re.findall(r"^## \[[^]]+\]\((\w+)/report\.md\)$", (REPORTS / "README.md").read_text(), re.M)
+    assert listed[:2] == ["speed", "conservation"]
+    assert sorted(listed) == COMMITTED
+
+
+@pytest.mark.parametrize("name", COMMITTED)
+def test_a_committed_report_is_the_one_drawn_from_its_results(name, undrawn):
+    """Short before it is unfolded, with its result first; the figures beside it are those of its text."""
+    drawn = page_in(REPORTS / name)
+    assert drawn.failed == []
+    text = (REPORTS / name / TEXT).read_text(encoding="utf-8")
+    assert markdown.markdown(drawn) == text
+    assert drawn.words <= MOST_WORDS
+    assert len(drawn.lead[0].split()) <= 160
+    figures = {path.name for path in (REPORTS / name).glob("figures/*.svg")}
+    assert figures == {Path(figure.file).name for figure in drawn.pictures}
+    folded = {id(block) for part in drawn.walk() if isinstance(part, Details) for block in part.blocks}
+    assert len([block for block in drawn.pictures if id(block) not in folded]) <= 8
+    assert all(isinstance(figure, Picture) and figure.summary for figure in drawn.pictures)

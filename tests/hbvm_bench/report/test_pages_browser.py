@@ -8,13 +8,11 @@ from hbvm_bench.report.document import Claim, Claims, Document, Section
 from hbvm_bench.report.figures.drawn import LOOKS
 from hbvm_bench.report.page import document, page_of
 from hbvm_bench.report.write import write
-from hbvm_bench.store.store import Store
 from hbvm_bench.studies.paper.experiments.properties import Order
 from hbvm_bench.studies.paper.properties_part import order
 from hbvm_bench.summaries.table import Table
 from tests.hbvm_bench.made_up_run import results_of
-from tests.hbvm_bench.studies import test_endure
-from tests.hbvm_bench.studies.race.conftest import made_up as made_up_race
+from tests.hbvm_bench.studies import made_up_studies
 
 from .test_report_browser import CHROMIUM, browser, opened, serious, too_wide, wait_for_change
 
@@ -40,10 +38,9 @@ def made_up_document():
 def folder(request, tmp_path_factory):
     target = tmp_path_factory.mktemp(request.param)
     if request.param == "race":
-        made = page_of(results_of(made_up_race().run))
+        made = page_of(results_of(made_up_studies.race()))
     elif request.param == "endure":
-        test_endure.made(target, years=1e5, starts=3)
-        made = document(Store(target))
+        made = document(made_up_studies.endurance(target, starts=3))
     else:
         made = made_up_document()
     write(made, target)

@@ -13,9 +13,8 @@ from hbvm_bench.campaign.file import Campaign, MethodEntry, shipped
 from hbvm_bench.report import pack
 from hbvm_bench.report.document import Details
 from hbvm_bench.report.figures.canvas import new
-from hbvm_bench.report.figures.plots import named, numbers
-from hbvm_bench.report.figures.portraits import crossings
-from hbvm_bench.report.index import not_measured, write_index
+from hbvm_bench.report.figures.plots import numbers
+from hbvm_bench.report.index import CHECKS, not_measured, write_index
 from hbvm_bench.report.markdown import markdown
 from hbvm_bench.report.page import document, gather
 from hbvm_bench.store.merge import merge
@@ -39,25 +38,11 @@ def test_the_numbers_of_a_figure_are_those_of_its_labelled_lines():
     figure, x = new(3.0, 2.0), np.linspace(0.0, 10.0, 101)
     axes = figure.subplots()
     assert numbers(figure) is None
-    axes.plot(x, np.where(x > 9.0, np.nan, x**2), label=named(3, 'a "b", c'))
+    axes.plot(x, np.where(x > 9.0, np.nan, x**2), label='a "b", c')
     axes.plot(x, x)
     axes.plot([], [], label="in the legend alone")
     table = numbers(figure)
-    assert table.rows == [("3", 'a "b", c', "", "101", "0", "10", "0", "81", "81")]
-
-
-def test_crossings_of_a_circle_are_where_it_passes_the_axis():
-    t = np.linspace(0.0, 40.0, 4001)
-    y = np.c_[np.sin(t), 0.3 + 0.0 * t, np.cos(t), 0.1 * t]
-    q2, p2 = crossings(y)
-    assert q2 == pytest.approx(np.full(6, 0.3))
-    # measured: 4e-15, as the momentum is linear in t
-    assert p2 == pytest.approx(0.1 * 2 * np.pi * np.arange(1, 7), abs=1e-6)
-    assert crossings(y[::400])[0].size == 0  # samples too far apart: a crossing would be a guess
-    late = np.unique(np.geomspace(1.0, 4000.0, 240).astype(int))  # and so are the later ones of these
-    assert crossings(y[late])[0].size == 0
-    y[:, 0] = np.nan
-    assert crossings(y)[0].size == 0
+    assert table.rows == [('a "b", c', "", "101", "0", "10", "0", "81", "81")]
 
 
 def test_runs_are_merged_and_of_two_alike_the_later_is_taken(tmp_path):
@@ -72,7 +57,7 @@ def test_runs_are_merged_and_of_two_alike_the_later_is_taken(tmp_path):
     made = document([first, second])
     assert made.title.startswith("2 runs together")
     assert "Measured on 2026-01-02 to 2026-11-22" in markdown(made)
-    assert [look.number for look in made.looks] == [1, 2, 3, 4]  # one look on every problem
+    assert [look.number for look in made.looks] == [1, 2, 3, 4, 5]  # of four families, and of the motion
 
 
 def test_a_report_keeps_of_a_case_what_merge_keeps(tmp_path):
@@ -107,10 +92,9 @@ def test_the_list_of_reports_says_what_each_is_with_a_picture_and_its_command(tm
     )
     (tmp_path / "unwritten").mkdir()
     text = write_index(tmp_path).read_text(encoding="utf-8")
-    for part in ("A title", "What it is about.", 'src="one/figures/x.png"', "one/report.md", "run one"):
+    for part in ("A title", "What it is about.", 'src="one/figures/x.png"', "one/report.md"):
         assert part in text
     assert "unwritten" not in text
-    assert "| one | not recorded |" in text
     (folder / "index.html").write_text("", encoding="utf-8")  # a page that is drawn changes no list
     assert write_index(tmp_path).read_text(encoding="utf-8") == text
 
@@ -132,37 +116,27 @@ def test_the_list_of_reports_says_when_and_where_each_was_measured(tmp_path):
     assert row in write_index(tmp_path).read_text(encoding="utf-8")
 
 
-def test_the_list_of_reports_names_the_campaigns_that_have_none_and_a_race_without_its_run_on_avx2(tmp_path):
-    def measured(*built, problems=(["pendulum()"], ["pendulum()"])):
-        runs = []
-        for features, names in zip(built, problems, strict=False):
-            timing = Timing(rounds=made_up_run.timed([1.0]), machine={"llvm_processor": "znver5"} | features)
-            records = [made_up_run.record("HBVM()", problem=name, timing=timing) for name in names]
-            index = Index(campaign=campaign, ids=[one.id for one in records], version="0", command="")
-            runs.append(StoredRun(index=index, records=records))
-        made_up_run.archived(tmp_path / "race", *runs)
-
-    campaign = Campaign(name="race", problems=["pendulum()"], methods=[MethodEntry(use="HBVM()")])
-    for name in {*shipped()} - {"drift", "large", "smoke"}:
+def test_the_list_names_the_campaigns_without_results_and_follows_its_template(tmp_path):
+    campaign = Campaign(name="x", problems=["pendulum()"], methods=[MethodEntry(use="HBVM()")])
+    one = made_up_run.record("HBVM()", problem="pendulum()")
+    index = Index(campaign=campaign, ids=[one.id], version="0", command="")
+    for name in {*shipped()} - {"drift", "large", *CHECKS}:
+        made_up_run.archived(tmp_path / "all" / name, StoredRun(index=index, records=[one]))
+    assert not_measured(tmp_path) == ["drift: Conservation in long integrations", "large: Large systems"]
+    for name in ("a", "b"):
         (tmp_path / name).mkdir()
-        (tmp_path / name / "report.md").write_text("# A title\n", encoding="utf-8")
-    avx2 = "race --avx2: The race: time at equal accuracy, with AVX2 only"
-    missing = ["drift: Conservation in long integrations", "large: Large systems"]
-    assert not_measured(tmp_path) == [*missing, avx2]  # no stored rows
-    measured({})
-    assert not_measured(tmp_path) == [*missing, avx2]
-    assert "## Not measured\n\n- drift: Conserv" in write_index(tmp_path).read_text(encoding="utf-8")
-    measured({}, {"ours_built_for": "AVX2"})
-    assert not_measured(tmp_path) == missing
-    campaign = Campaign(name="race", problems=["pendulum()", "kepler()"], methods=[MethodEntry(use="HBVM()")])
-    measured({}, {"ours_built_for": "AVX2"}, problems=[["pendulum()", "kepler()"], ["pendulum()"]])
-    assert not_measured(tmp_path) == [*missing, f"{avx2}: kepler()"]
-    measured({}, {"ours_built_for": "AVX2"})
-    for name in ("drift", "large"):
-        (tmp_path / name).mkdir()
-        (tmp_path / name / "report.md").write_text("# A title\n", encoding="utf-8")
-    assert not_measured(tmp_path) == []
-    assert "Not measured" not in write_index(tmp_path).read_text(encoding="utf-8")
+        (tmp_path / name / "report.md").write_text(f"# Title {name}\n", encoding="utf-8")
+    text = write_index(tmp_path).read_text(encoding="utf-8")
+    assert text.index("Title a") < text.index("Title b")
+    assert "## Not measured\n\n- drift: Conserv" in text
+    assert "| all/race | 2026-01-02 |" in text
+    (tmp_path / "page.md").write_text('# Mine\n\n{{ entry("b") }}\n\n{{ entry("a") }}\n')
+    text = write_index(tmp_path).read_text(encoding="utf-8")
+    assert text.startswith("# Mine")
+    assert text.index("Title b") < text.index("Title a")
+    (tmp_path / "page.md").write_text('{{ entry("c") }}')
+    with pytest.raises(InputError, match="cannot be made"):
+        write_index(tmp_path)
 
 
 def test_a_directory_without_reports_has_no_list(tmp_path):

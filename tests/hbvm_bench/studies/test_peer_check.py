@@ -15,8 +15,8 @@ from hbvm_bench.campaign.spec import Spec, parse_spec
 from hbvm_bench.measure import batch
 from hbvm_bench.store.records import Compile, Counters, Record, Result, Timing, TimingRound
 from hbvm_bench.store.store import Store
-from hbvm_bench.studies.peers import alone, report
-from hbvm_bench.studies.peers.report import ALONE, Pair
+from hbvm_bench.studies.peers import alone, blocks
+from hbvm_bench.studies.peers.blocks import ALONE, Pair
 from hbvm_bench.summaries.rows import Task
 from integrators.protocol import Status
 from problems.errors import InputError
@@ -147,34 +147,17 @@ def made_up(ratio=1.0, steps=5, seconds=0.03, difference=0.0):
 )
 def test_a_row_is_marked_where_the_bench_costs_too_much_or_steps_differ(pair, beyond):
     assert pair.beyond is beyond
-    assert report.healthy([pair]) is not beyond
-    assert ("(beyond)" in report.table([pair]).rows[0][2]) is beyond
-
-
-def test_the_best_compilation_stands_beside_the_median_through_the_bench_and_alone():
-    def recompiled(record):
-        rounds = [
-            msgspec.structs.replace(one, compilation=i, samples=[seconds])
-            for i, (one, seconds) in enumerate(zip(record.timing.rounds, (0.2, 0.1, 0.3), strict=True))
-        ]
-        return msgspec.structs.replace(record, timing=msgspec.structs.replace(record.timing, rounds=rounds))
-
-    pair = made_up()
-    assert report.compiled([pair]) is None
-    table = report.compiled([replace(pair, bench=recompiled(pair.bench), alone=recompiled(pair.alone))])
-    assert table is not None
-    assert [row[2:] for row in table.rows] == [
-        (where, "3", "200 ms", "100 ms", "3.00") for where in ("bench", "alone")
-    ]
+    assert blocks.healthy([pair]) is not beyond
+    assert ("(beyond)" in blocks.table([pair]).rows[0][2]) is beyond
 
 
 def test_a_peer_that_did_not_run_is_named_and_not_healthy():
     failed = msgspec.structs.replace(made_up().bench, result=Result(outcome="refused", reason="no AVX-512"))
     pair = replace(made_up(), bench=failed)
     assert pair.failed == "refused: no AVX-512"
-    assert not report.healthy([pair])
-    assert report.table([pair]).rows == []
-    assert not report.healthy([])
+    assert not blocks.healthy([pair])
+    assert blocks.table([pair]).rows == []
+    assert not blocks.healthy([])
 
 
 @pytest.mark.slow
@@ -186,9 +169,9 @@ def test_the_command_runs_the_campaign_and_writes_its_page(monkeypatch, tmp_path
     code = cli.main(["doctor", "--peers", "--rounds", "2", "--out", str(tmp_path / "run")])
     assert code in (0, 1)  # this machine may be busy
     assert "DOP853" in capsys.readouterr().out
-    assert "bench / alone" in (tmp_path / "run" / "report" / "README.md").read_text()
+    assert "bench / alone" in (tmp_path / "run" / "report" / "report.md").read_text()
     records = Store(tmp_path / "run").records()
     assert [len(one.timing.rounds) for one in records] == [2, 2]
     bench, library = (one.result.counters.steps for one in records)
-    assert abs(bench - library) <= report.A_STEP
+    assert abs(bench - library) <= blocks.A_STEP
     assert library >= 50

@@ -217,13 +217,3 @@ def test_a_run_keeps_the_dates_of_its_goals_and_says_which_came_after_a_measurem
     again, new = ran(replace(campaign, goals=[first, later]))
     assert again == before
     assert (new.measured, goals.is_after(new.declared, new.measured)) == ("2026-01-01T00:00:00+00:00", True)
-
-
-def test_a_default_is_compared_with_ours_at_no_larger_errors():
-    errors = ("energy_max", "position_end")
-    found = standings.untuned(RECORDS, "Taylor", errors)
-    assert found.theirs.case.method == "Taylor()"
-    assert found.ours is None  # none of ours has both errors below 2e-15 and 1e-12
-    assert standings.untuned(RECORDS, "WHFast", errors).theirs is None
-    looser = record("Taylor()", [27.0, 30.0, 36.0], 1e-13, 1e-10, settings="default")
-    assert standings.untuned([looser, *RECORDS[:3]], "Taylor", errors).ratio.median == pytest.approx(15.0)

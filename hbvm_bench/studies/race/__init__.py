@@ -1,1 +1,0 @@
-"""The race: which integrator is the fastest at the same accuracy."""
