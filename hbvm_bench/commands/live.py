@@ -58,6 +58,7 @@ class Live:
     def case(self, record: Record) -> None:
         """Report a case that has ended."""
         self._count += 1
+        self._since.pop(record.id, None)
         status = status_of(record)
         self._console.print(
             Text.assemble(
