@@ -4,11 +4,10 @@ import re
 from functools import cache
 from pathlib import Path
 
-import pandas as pd
-
 from hbvm_bench.report.page import gather
 from hbvm_bench.store.store import PACKED, Store
 from hbvm_bench.summaries import cost_ratio
+from hbvm_bench.summaries.frame import Frame
 from hbvm_bench.summaries.goals import digits
 from hbvm_bench.summaries.rows import seconds
 
@@ -36,13 +35,13 @@ LOST = {
 
 
 @cache
-def frame(place: str) -> pd.DataFrame:
+def frame(place: str) -> Frame:
     """Return the results table of a folder in ``reports``."""
     return gather(Store(ROOT / "reports" / place / PACKED).runs()).frame
 
 
 @cache
-def raced(at: str = "") -> pd.DataFrame:
+def raced(at: str = "") -> Frame:
     """Return the ratios of the race, at the errors that its problems ask for or at several."""
     return cost_ratio.ratios(frame("speed/race"), at, equal_settings=True)
 

@@ -32,7 +32,7 @@ def curves(record: Record, series: Mapping[str, Array]) -> dict[str, Array]:
     if record.case.ensemble is not None:
         return {}
     found: dict[str, Array] = {}
-    drawn = reading.drawn(record, series)
+    drawn = reading.drawn(record, dict(series))
     for name, values in drawn.items():
         t = drawn.get("position_t" if name == "position" else "t", np.empty(0))
         if name.startswith(DRAWN) and name != "position_t" and t.size and values.shape == t.shape:

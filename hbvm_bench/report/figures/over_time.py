@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from hbvm_bench.campaign.spec import parse_spec
@@ -80,13 +81,13 @@ def over_time(cases: Sequence[Drawn], spec: OverTime) -> Picture | None:
     shown = telling(having)
     if not shown:
         return None
-    curves = [spec.get(case) for case in shown]
-    low, high = power_range([values for _, values in filter(_there, curves)], *POWERS)
-    axes = _axes(spec.label, shown[0].record.case.problem)
+    curves = [curve for case in shown if (curve := spec.get(case)) is not None]
+    low, high = power_range([values for _, values in curves], *POWERS)
+    figure, axes = _axes(spec.label, shown[0].record.case.problem)
     log_axis(axes, "y", low, high)
     look_of = looks(family_of(case.record) for case in shown)
     ends, said = [], []
-    for case, (t, values) in zip(shown, filter(_there, curves), strict=True):
+    for case, (t, values) in zip(shown, curves, strict=True):
         mine = look_of[family_of(case.record)]
         seen = np.clip(values, 10.0**low, 10.0**high)
         name = case.record.case.method
@@ -96,7 +97,7 @@ def over_time(cases: Sequence[Drawn], spec: OverTime) -> Picture | None:
     label(axes, ends)
     left = len({family_of(case.record) for case in having}) - len(shown)
     return picture(
-        axes.get_figure(root=True),
+        figure,
         spec.key,
         spec.title,
         f"{spec.caption} Of each family its most accurate setting; a line is the largest value in each of 60 "
@@ -119,7 +120,9 @@ def growth(cases: Sequence[Drawn], key: str = "growth") -> Picture | None:
         return None
     drawn = [case.curves[GROWTH] for case in shown]
     starts = max(case.record.case.checks.starts for case in shown)
-    axes = _axes(f"relative energy error, rms over {starts} initial conditions", shown[0].record.case.problem)
+    figure, axes = _axes(
+        f"relative energy error, rms over {starts} initial conditions", shown[0].record.case.problem
+    )
     low, high = power_range([rms for _, rms, _, _ in drawn], *POWERS)
     times = np.concatenate([t for t, *_ in drawn])
     log_axis(axes, "x", math.floor(math.log10(times.min())), math.ceil(math.log10(times.max())))
@@ -141,7 +144,7 @@ def growth(cases: Sequence[Drawn], key: str = "growth") -> Picture | None:
     ends.append(End("√t", 10.0 ** (low + 0.3) * 1e3**0.5, MUTED))
     label(axes, ends)
     return picture(
-        axes.get_figure(root=True),
+        figure,
         key,
         "Growth of the energy error",
         "Line: root mean square over the initial conditions; band: 16 % to 84 % of them. Grey: growth as the "
@@ -150,16 +153,12 @@ def growth(cases: Sequence[Drawn], key: str = "growth") -> Picture | None:
     )
 
 
-def _axes(title: str, problem: str) -> Axes:
+def _axes(title: str, problem: str) -> tuple[Figure, Axes]:
     figure = new(WIDTH, 3.3)
     axes = figure.add_axes((0.12, 0.15, 0.64, 0.76))
     axes.set_title(title, fontweight="normal")
     axes.set_xlabel(time_label(problem))
-    return axes
-
-
-def _there(curve: Array | None) -> bool:
-    return curve is not None
+    return figure, axes
 
 
 def cut(text: str, room: int = 22) -> str:
