@@ -1,6 +1,5 @@
 """The report's machinery: departure, tasks, documents, the command."""
 
-import io
 import re
 import sqlite3
 from contextlib import closing
@@ -16,7 +15,6 @@ from hbvm_bench.campaign import folder
 from hbvm_bench.campaign.file import load, shipped
 from hbvm_bench.cli import main
 from hbvm_bench.measure.computation import function_of, packed, unpacked
-from hbvm_bench.report.figures.canvas import new, small
 from hbvm_bench.report.figures.drawn import number
 from hbvm_bench.report.page import Results
 from hbvm_bench.report.parts import Part, PartResults
@@ -97,7 +95,7 @@ def ran(study, store, *, quick=False):
     campaign = replace(load("smoke"), computes="./blocks.py:tasks", quick=quick)
     left = computing.missing(computing.plan(campaign, study), store)
     with executors.opened(jobs=1) as pool:
-        return [row.case.method for row in computing.run(left, store, campaign, pool, lambda running: None)]
+        return [row.case.method for row in computing.run(left, store, pool, lambda running: None)]
 
 
 def results_of(study, store):
@@ -167,22 +165,6 @@ def test_the_same_figure_gives_the_same_bytes():
     times = {"gauss": [100.0, None], "hbvm": [None, None]}
     first, second = fates(times), fates(times)
     assert first.svg == second.svg
-
-
-def test_pictures_are_kept_small_without_a_visible_difference():
-    from PIL import Image
-
-    stream, sheet_of_paper = io.BytesIO(), new(5.0, 3.0)
-    sheet_of_paper.subplots().plot(np.sin(np.linspace(0.0, 20.0, 400)))
-    sheet_of_paper.savefig(stream, format="png", dpi=160)
-    drawn = stream.getvalue()
-    made = small(drawn)
-    assert len(made) < 0.6 * len(drawn)  # measured 0.4
-    before, after = (
-        np.asarray(Image.open(io.BytesIO(png)).convert("RGBA").convert("RGB"), dtype=float)
-        for png in (drawn, made)
-    )
-    assert np.abs(before - after).mean() < 1.5  # of 255; measured 1.04: the palette has white as 254
 
 
 @pytest.fixture
