@@ -158,8 +158,11 @@ class _Entries:
         inner, read = self._stages[stage], place.values(loop)
         self.too_large |= inner.too_large
         for (at, column), nodes in inner.plain.items():
-            some = self.graph.loop(loop.rows[read == at])
-            for node in nodes if len(some) else ():
+            rows = loop.rows[read == at]
+            if len(rows) == 0:  # nothing reads it
+                continue
+            some = self.graph.loop(rows)
+            for node in nodes:
                 product = _moved(self.graph, slope, loop, some, 0) * node
                 self._enter(some, row, _constant(some, column), product)
         for other, entries in inner.loops.items():
