@@ -9,6 +9,7 @@ from problems import Problem
 from .linkages import linkage
 
 TIMES = np.linspace(0.0, 5.0, 11)[1:]
+FEW = (3, 8, 38)  # few masses; in the last its rods hold one at rest
 
 
 def checked(number):
@@ -35,12 +36,12 @@ def checked(number):
     return wrong
 
 
-@pytest.mark.parametrize("number", range(20))
+@pytest.mark.parametrize("number", FEW)
 def test_a_random_linkage_is_right_or_says_that_it_is_not(number):
     assert checked(number) == []
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", range(20, 200))
+@pytest.mark.parametrize("number", sorted({*range(200)} - {*FEW}))
 def test_more_random_linkages_are_right_or_say_that_they_are_not(number):
     assert checked(number) == []
