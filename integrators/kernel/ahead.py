@@ -6,6 +6,7 @@ from multiprocessing import get_context
 from integrators.kernel.engines import (
     follow,
     iterations,
+    lanes,
     line,
     look,
     orthonormal,
@@ -16,6 +17,7 @@ from integrators.kernel.engines import (
     solver,
     steps,
 )
+from integrators.kernel.ensemble.prepared import LANES
 from integrators.kernel.native import lowered
 from integrators.kernel.routes import FEW_ROWS
 
@@ -38,6 +40,9 @@ FORMS = [
     for lanes, by_columns in ((8, True), (16, False), (16, True))
 ]
 """Of whole iterations; see `integrators.kernel.step.fused`."""
+
+WIDTHS = [(count * LANES,) for count in (1, 2, 4)]
+"""Of trajectories side by side; see `integrators.kernel.ensemble.prepared.width_for`."""
 
 
 def compile_ahead(processes: int = 1) -> dict[str, float | None]:
@@ -63,7 +68,9 @@ def compile_ahead(processes: int = 1) -> dict[str, float | None]:
 def lower() -> None:
     """Write the text of LLVM that every machine of this system can start from, where the package is built."""
     texts = {engine.key: engine.lower() for engine in ENGINES.values()}
-    lowered.write(texts | {iterations.key(form): iterations.lower(form) for form in FORMS})
+    for around, forms in ((iterations, FORMS), (lanes, WIDTHS)):
+        texts |= {around.key(form): around.lower(form) for form in forms}
+    lowered.write(texts)
 
 
 def _compile(name: str) -> tuple[str, float | None]:

@@ -42,6 +42,9 @@ record = Engine("adjoint.entry", "record", "event ctx tape")
 pull = Engine("adjoint.entry", "pull", "ctx pullback")
 """``pull(ctx, pullback)``: see `integrators.kernel.adjoint.entry`."""
 
+lanes = Around("ensemble.steps", "steps", "constants group count")
+"""Steps of so many trajectories side by side, with a `Form` as constants; see `ensemble.steps`."""
+
 run = Engine("ensemble.loop", "run", "group partial budget")
 """``run(group, partial, budget)``: see `integrators.kernel.ensemble.loop`."""
 

@@ -5,315 +5,251 @@ followed here, by the rules of `integrators.kernel.step.estimate` and `integrato
 lane where anything else happens (a step that failed or was too long, a sample that is near, a coefficient
 that looks like that of a discontinuity) is left as it is, and marked for `integrators.kernel.ensemble.own` to
 look after.
+
+What differs from a single trajectory: coefficients are sums in another order, so that they differ in the last
+bits; lengths are not rounded to ratios with tables, of which lanes have none.
 """
 
-from math import sqrt
 from typing import Any
 
-from integrators.kernel.ensemble.group import Group
-from integrators.kernel.parts.estimate import (
-    GAMMA_0,
+from integrators.kernel.native.jit import compiled
+from integrators.kernel.simd.lanes import everywhere
+from integrators.kernel.simd.operations import fma, greatest, opposite, size, where
+from integrators.kernel.simd.views import as_rows
+from integrators.kernel.step.control import (
+    APPROACH,
+    INFINITY,
+    as_errors_allow,
+    as_iterations_allow,
+    bounded,
+    is_distinct,
+    is_good,
+    log_of_order,
+    log_ratio,
+    room_for_longer,
 )
-from integrators.kernel.simd.emit import DOUBLE, splat
-from integrators.kernel.simd.operations import greatest, where
-from integrators.kernel.simd.values import Condition, Value
+from integrators.kernel.step.discontinuities import gap_allowed
+from integrators.kernel.step.estimate import (
+    changes,
+    floored_slope,
+    is_doubtful,
+    is_gap,
+    judged,
+    local_error,
+    size_in_step,
+)
+from integrators.kernel.step.rounding import is_evident, is_visible
 from integrators.kernel.step.rule import SMALLEST
-
-INFINITY = float("inf")
-
-
-def in_powers(k: int) -> list[list[float]]:
-    """Return the factors of powers of x in Legendre polynomials on [-1, 1], orthonormal on [0, 1].
-
-    Returns
-    -------
-    list of list of float
-        For each power m below k those in the polynomials of degrees m, m + 2, ... below k.
-    """
-    from numpy.polynomial.legendre import leg2poly  # takes its time, and is needed to compile only
-
-    powers = [leg2poly([0.0] * j + [sqrt(2 * j + 1)]) for j in range(k)]
-    return [[float(powers[j][m]) for j in range(m, k, 2)] for m in range(k)]
+from integrators.kernel.step.size import speed_of
+from integrators.kernel.step.sums import time_after
+from integrators.kernel.step.vary import LIMITED_GROWTH, MOST_GROWTH
+from problems.targets.called import room
 
 
-# Rooms that the iteration does not need any more
-MEASURED = "size", "moved", "block_weights", "floored_weights"
+def ends_of_steps(lanes: int) -> Any:
+    """Return what takes the step, and aims at the next one, in the lanes where that is all."""
 
-
-class Control:
-    """Writes the end of a step.
-
-    Estimate, verdict and next length are the functions of `integrators.kernel.step.estimate`,
-    `discontinuities` and `control` that a single trajectory calls, applied to rows. What differs:
-    coefficients are sums in another order, so that they differ in the last bits; lengths are not rounded to
-    ratios with tables, of which lanes have none; and only the ordinary end of a step is written. Every other
-    one is left to `own.end_attempt`.
-
-    Parameters
-    ----------
-    w : Steps
-        Writes the step itself, of `integrators.kernel.ensemble.steps`.
-    """
-
-    def __init__(self, w: Any):
-        self.w, self.h = w, w.h.absolute()
-
-    def row(self, name: str) -> Value:
-        """Return a row of one number in each lane."""
-        return self.w.get(self.w.array(Group.slots[name]))
-
-    def number(self, name: str) -> Value:
-        """Return a number of the group in all lanes."""
-        b = self.w.b
-        return Value(b, splat(b, b.load(self.w.word(Group.slots[name], DOUBLE)), self.w.lanes))
-
-    def all(self, *conditions: Any) -> Any:
-        """Return where all conditions hold."""
-        result = conditions[0]
-        for condition in conditions[1:]:
-            result = self.w.b.and_(result, condition)
-        return result
-
-    def judge(self) -> None:
-        """Set `error`, `quadrature_error`, where blocks are `certain` and `visible`; see `estimate`."""
-        from integrators.kernel.step import estimate as rules  # imports numba, which compiling needs anyhow
-        from integrators.kernel.step.discontinuities import gap_allowed
-        from integrators.kernel.step.rounding import is_evident, is_visible
-
-        w, b = self.w, self.w.b
-        error, quadrature_error, evident_error, evident_quadrature_error = (
-            w.variable(w.kind, w.zero.value) for _ in range(4)
-        )
-        none = w.zero.compare("!=", 0.0)
-        doubtful, visible, changing = (w.variable(w.bits, none) for _ in range(3))
-        most_apart = gap_allowed(
-            self.number("negligible"),
-            self.number("outermost"),
-            self.h,
-            self.row("previous_length").absolute(),
-        )
-
-        def raise_to(variable: Any, value: Value) -> None:
-            b.store(greatest(value, Value(b, b.load(variable))).value, variable)
-
-        def note(variable: Any, condition: Condition) -> None:
-            b.store(b.or_(b.load(variable), condition.value), variable)
-
-        for first, blocks, width in w.form.groups:
-            largest, steepest = (w.variable(w.kind, w.zero.value) for _ in range(2))
-
-            tops = largest, steepest
-
-            def measure(block: Any, first: int = first, width: int = width, tops: Any = tops) -> None:
-                start = w.at(block, width, first)
-                scale = slope = gamma_error = gamma_last = gap = w.zero
-                for i in range(width):
-                    d = w.at(start, 1, i)
-                    gammas, start_value, end_value = self.coefficients(d)
-                    low, high, own, here, last = rules.judged(
-                        *gammas, self.number("error_decay"), self.number("quadrature_error_decay")
-                    )
-                    note(doubtful, rules.is_doubtful(low, high, self.number("doubt")))
-                    note(changing, rules.changes(low, high, gammas[GAMMA_0]))
-                    moved = w.get(w.state, w.at(1, w.form.rows, d) if w.form.second else d).absolute()
-                    scale, slope = greatest(scale, moved + self.h * own), greatest(slope, own)
-                    gamma_error, gamma_last = greatest(gamma_error, here), greatest(gamma_last, last)
-                    gap = greatest(gap, self.gap(d, high, start_value, end_value))
-                w.put(gap, w.array(Group.slots["gaps"]), start)
-                for name, value in zip(MEASURED, (scale, slope, gamma_error, gamma_last), strict=True):
-                    w.put(value, getattr(w, name), start)
-                speed = self.speed(start)
-                raise_to(tops[0], scale * speed)
-                raise_to(tops[1], slope * speed)
-
-            w.each(blocks, measure)
-            top, largest_slope = Value(b, b.load(largest)), Value(b, b.load(steepest))
-            note(doubtful, top < SMALLEST)
-
-            def compare(
-                block: Any, first: int = first, width: int = width, tops: Any = (top, largest_slope)
-            ) -> None:
-                start = w.at(block, width, first)
-                scale, slope, gamma_error, gamma_last = (w.get(getattr(w, name), start) for name in MEASURED)
-                mass = w.unity / self.speed(start)
-                largest = tops[0] * mass
-                scale = rules.size_in_step(scale, largest)
-                slope = rules.floored_slope(slope, tops[1] * mass, self.number("least_slope"))
-                for gamma, worst, evident in (
-                    (gamma_error, error, evident_error),
-                    (gamma_last, quadrature_error, evident_quadrature_error),
-                ):
-                    own = where(slope > 0.0, rules.local_error(self.h, gamma, slope, scale), 0.0)
-                    raise_to(worst, own)
-                    raise_to(evident, where(is_evident(self.h, gamma, largest), own, 0.0))
-                note(visible, is_visible(self.h, gamma_error, scale))
-                note(doubtful, w.get(w.array(Group.slots["gaps"]), start) > most_apart * scale)
-
-            w.each(blocks, compare)
-        self.error, self.quadrature_error = (Value(b, b.load(worst)) for worst in (error, quadrature_error))
-        self.evident = [
-            Value(b, b.load(evident)) >= own
-            for evident, own in (
-                (evident_error, self.error),
-                (evident_quadrature_error, self.quadrature_error),
-            )
-        ]
-        self.certain = b.and_(b.not_(b.load(doubtful)), b.load(changing))
-        self.visible = b.load(visible)
-
-    def speed(self, d: Any) -> Value:
+    @compiled
+    def speed(form, group, d, unity):
         """Return the velocity by momentum of row d, as `Blocks.speed`."""
-        from integrators.kernel.step.size import speed_of
+        return speed_of(as_rows(group.velocity, lanes)[d]) if form.second else unity
 
-        w = self.w
-        return speed_of(w.get(w.velocity, d)) if w.form.second else w.unity
-
-    def coefficients(self, d: Any) -> tuple[list[Value], Value, Value]:
-        """Return what row d is judged by, and keep its polynomial for the first values of the next step.
-
-        Returns
-        -------
-        sizes : list of Value
-            Of the field's coefficients `GAMMA_0` .. `LAST`.
-        start, end : Value
-            The polynomial at both ends of the step.
-        """
-        w, form = self.w, self.w.form
-        sums = self.modes(d)
-        ends = [w.zero, w.zero]  # at the end what polynomials of even degree contribute, and of odd degree
-        for j, coefficient in enumerate(sums):
-            ends[j % 2] = coefficient.fma(sqrt(2 * j + 1), ends[j % 2])
-        for power, factors in enumerate(in_powers(form.k)):
-            total = w.zero
-            for coefficient, factor in zip(sums[power::2], factors, strict=True):
-                total = coefficient.fma(factor, total)
-            w.put(total, w.ahead, w.at(power, form.rows, d))
-        even, odd = ends
-        return [sums[j].absolute() for j in form.judged], even - odd, even + odd
-
-    def modes(self, d: Any) -> list[Value]:
-        """Return the Legendre coefficients of the values of row d.
+    @compiled
+    def modes(form, group, values, d, parts, sums, zero):
+        """Set the Legendre coefficients of the values of row d.
 
         Those of even degree are the same for values at mirrored nodes, those of odd degree opposite.
         """
-        w, k, rows = self.w, self.w.form.k, self.w.form.rows
-        table, values = (
-            w.table(Group.slots["to_legendre"]),
-            [w.get(w.values, w.at(i, rows, d)) for i in range(k)],
-        )
-        pairs = [(values[i], values[k - 1 - i]) for i in range(k // 2)]
-        parts = [x + y for x, y in pairs] + values[k // 2 : k - k // 2], [x - y for x, y in pairs]
-        sums = []
+        k, rows = form.k, form.rows
+        half, halves = k // 2, (k + 1) // 2
+        for i in range(half):
+            x, y = values[rows * i + d], values[rows * (k - 1 - i) + d]
+            parts[i], parts[k - 1 - i] = x + y, x - y
+        if k % 2 == 1:
+            parts[half] = values[rows * half + d]
         for j in range(k):
-            total = w.zero
-            for i, part in enumerate(parts[j % 2]):
-                total = w.number(table, k * j + i).fma(part, total)
-            sums.append(total)
-        return sums
+            total = zero
+            for i in range(half if j % 2 == 1 else halves):
+                total = fma(group.to_legendre[k * j + i], parts[k - 1 - i if j % 2 == 1 else i], total)
+            sums[j] = total
 
-    def gap(self, d: Any, last: Value, start: Value, end: Value) -> Value:
+    @compiled
+    def keep_polynomial(form, group, d, sums, zero):
+        """Keep row d's polynomial for the next step's first values; return it at both ends of this one."""
+        k, rows = form.k, form.rows
+        ahead, powers = as_rows(group.ahead, lanes), group.in_powers
+        even, odd = zero, zero
+        for j in range(k):
+            if j % 2 == 0:
+                even = fma(sums[j], powers[k * k + j], even)
+            else:
+                odd = fma(sums[j], powers[k * k + j], odd)
+        for power in range(k):
+            total = zero
+            for j in range(power, k, 2):
+                total = fma(sums[j], powers[k * power + j], total)
+            ahead[rows * power + d] = total
+        return even - odd, even + odd
+
+    @compiled
+    def gap(group, d, last, start, end):
         """Return how far row d's polynomials are apart where two steps meet, if farther than it may be."""
-        from integrators.kernel.step.estimate import is_gap
+        as_rows(group.next_ends, lanes)[d] = end
+        as_rows(group.next_last_coefficients, lanes)[d] = last
+        apart = size(start - as_rows(group.ends, lanes)[d])
+        return where(is_gap(apart, last, as_rows(group.last_coefficients, lanes)[d]), apart, 0.0)
 
-        w, slots = self.w, Group.slots
-        w.put(end, w.array(slots["next_ends"]), d)
-        w.put(last, w.array(slots["next_last_coefficients"]), d)
-        previous, previous_last = (w.get(w.array(slots[name]), d) for name in ("ends", "last_coefficients"))
-        apart = (start - previous).absolute()
-        return where(is_gap(apart, last, previous_last), apart, 0.0)
-
-    def set_factor(self) -> None:
-        """Set the `factor` of the next step's length to this one's; see `integrators.kernel.step.control`."""
-        from integrators.kernel.step.control import (
-            APPROACH,
-            as_errors_allow,
-            as_iterations_allow,
-            bounded,
-            log_of_order,
-            log_ratio,
-            room_for_longer,
+    @compiled
+    def judge(form, group, values, length, scales, slopes, gamma_errors, gamma_lasts):
+        """Return both errors, whether they are evident, and where blocks are certain, and visible."""
+        state, gaps = as_rows(group.state, lanes), as_rows(group.gaps, lanes)
+        zero, unity = everywhere(0.0, length), everywhere(1.0, length)
+        error, quadrature_error, evident_error, evident_quadrature_error = zero, zero, zero, zero
+        doubtful = visible = changing = zero > 0.0
+        most_apart = gap_allowed(
+            group.negligible, group.outermost, length, size(as_rows(group.previous_length, lanes)[0])
         )
-        from integrators.kernel.step.vary import LIMITED_GROWTH, MOST_GROWTH
+        rows, count, width = form.rows, form.blocks.count, form.blocks.width
+        parts, sums = room(state, form.k), room(state, form.k)
+        for g in range(form.blocks.groups):
+            largest, steepest = zero, zero
+            for b in range(count):
+                start = form.blocks.first + (g * count + b) * width
+                scale, slope, gamma_error, gamma_last, far = zero, zero, zero, zero, zero
+                for d in range(start, start + width):
+                    modes(form, group, values, d, parts, sums, zero)
+                    at_start, at_end = keep_polynomial(form, group, d, sums, zero)
+                    low, high, own, here, last = judged(
+                        size(sums[form.gamma_0]),
+                        size(sums[form.gamma_1]),
+                        size(sums[form.gamma_2]),
+                        size(sums[form.gamma_3]),
+                        size(sums[form.before_error]),
+                        size(sums[form.at_error]),
+                        size(sums[form.before_last]),
+                        size(sums[form.last]),
+                        group.error_decay,
+                        group.quadrature_error_decay,
+                    )
+                    doubtful = doubtful | is_doubtful(low, high, group.doubt)
+                    changing = changing | changes(low, high, size(sums[form.gamma_0]))
+                    moved = size(state[rows + d if form.second else d])
+                    scale, slope = greatest(scale, moved + length * own), greatest(slope, own)
+                    gamma_error, gamma_last = greatest(gamma_error, here), greatest(gamma_last, last)
+                    far = greatest(far, gap(group, d, high, at_start, at_end))
+                gaps[start], scales[start], slopes[start] = far, scale, slope
+                gamma_errors[start], gamma_lasts[start] = gamma_error, gamma_last
+                velocity = speed(form, group, start, unity)
+                largest = greatest(scale * velocity, largest)
+                steepest = greatest(slope * velocity, steepest)
+            doubtful = doubtful | (largest < SMALLEST)
+            for b in range(count):
+                start = form.blocks.first + (g * count + b) * width
+                mass = unity / speed(form, group, start, unity)
+                most = largest * mass
+                scale = size_in_step(scales[start], most)
+                slope = floored_slope(slopes[start], steepest * mass, group.least_slope)
+                gamma_error, gamma_last = gamma_errors[start], gamma_lasts[start]
+                own = where(slope > 0.0, local_error(length, gamma_error, slope, scale), 0.0)
+                error = greatest(own, error)
+                evident_error = greatest(
+                    where(is_evident(length, gamma_error, most), own, 0.0), evident_error
+                )
+                own = where(slope > 0.0, local_error(length, gamma_last, slope, scale), 0.0)
+                quadrature_error = greatest(own, quadrature_error)
+                evident_quadrature_error = greatest(
+                    where(is_evident(length, gamma_last, most), own, 0.0), evident_quadrature_error
+                )
+                visible = visible | is_visible(length, gamma_error, scale)
+                doubtful = doubtful | (gaps[start] > most_apart * scale)
+        return (
+            error,
+            quadrature_error,
+            evident_error >= error,
+            evident_quadrature_error >= quadrature_error,
+            opposite(doubtful) & changing,
+            visible,
+        )
 
-        w, b = self.w, self.w.b
-        limited = self.number("allowed_quadrature_error") < INFINITY
-        error_aim, quadrature_error_aim = self.number("error_aim"), self.number("quadrature_error_aim")
-        self.error = log_of_order(self.error, self.number("error_power"))
-        self.quadrature_error = log_of_order(self.quadrature_error, self.number("quadrature_error_power"))
-        factor, in_doubt = as_errors_allow(
-            self.error,
-            self.row("previous_error"),
-            error_aim,
-            self.quadrature_error,
-            self.row("previous_quadrature_error"),
-            quadrature_error_aim,
+    @compiled
+    def keep(numbers, good, new):
+        """Set a row where a step is good."""
+        row = as_rows(numbers, lanes)
+        row[0] = where(good, new, row[0])
+
+    @compiled
+    def keep_rows(numbers, good, new, n):
+        """Set n rows where a step is good."""
+        rows_, news = as_rows(numbers, lanes), as_rows(new, lanes)
+        for d in range(n):
+            rows_[d] = where(good, news[d], rows_[d])
+
+    @compiled
+    def end_step(form, group, values, h, alive, iterations, scales, slopes, gamma_errors, gamma_lasts):
+        length, rows = size(h), form.rows
+        dim = 2 * rows if form.second else rows
+        previous_length = as_rows(group.previous_length, lanes)[0]
+        error, quadrature_error, error_is_evident, quadrature_error_is_evident, certain, visible = judge(
+            form, group, values, length, scales, slopes, gamma_errors, gamma_lasts
+        )
+        good = alive & is_good(error, group.allowed_error, quadrature_error, group.allowed_quadrature_error)
+        limited = everywhere(group.allowed_quadrature_error, length) < INFINITY
+        error = log_of_order(error, group.error_power)
+        quadrature_error = log_of_order(quadrature_error, group.quadrature_error_power)
+        logarithm, in_doubt = as_errors_allow(
+            error,
+            as_rows(group.previous_error, lanes)[0],
+            group.error_aim,
+            quadrature_error,
+            as_rows(group.previous_quadrature_error, lanes)[0],
+            group.quadrature_error_aim,
             limited,
-            log_ratio(self.h / self.row("previous_length").absolute()),
-            *self.evident,
+            log_ratio(length / size(previous_length)),
+            error_is_evident,
+            quadrature_error_is_evident,
             0.0,
         )
-        self.limit = self.row("length_limit") * APPROACH
-        iterations = Value(b, b.load(w.iterations)) - self.row("before")
-        self.certain = b.and_(self.certain, b.not_(in_doubt.value))
-        self.factor = as_iterations_allow(
-            bounded(factor, MOST_GROWTH), self.number("target_iterations"), iterations, self.h, self.limit
+        limit = as_rows(group.length_limit, lanes)[0] * APPROACH
+        factor = as_iterations_allow(
+            bounded(logarithm, MOST_GROWTH),
+            group.target_iterations,
+            iterations - as_rows(group.before, lanes)[0],
+            length,
+            limit,
         )
-        room = room_for_longer(self.error, error_aim, self.quadrature_error, quadrature_error_aim, limited)
-        kept = b.and_(room.compare("<=", self.number("worth")), self.visible)
-        self.free = b.or_(self.factor.compare(">=", LIMITED_GROWTH), kept)
-
-    def take(self) -> None:
-        """Take the step, and aim at the next one, in the lanes where that is all."""
-        from integrators.kernel.step.control import is_distinct, is_good
-        from integrators.kernel.step.sums import time_after
-
-        w, b = self.w, self.w.b
-        slots = Group.slots
-        self.judge()
-        good = self.all(
-            b.load(w.alive),
-            is_good(
-                self.error,
-                self.number("allowed_error"),
-                self.quadrature_error,
-                self.number("allowed_quadrature_error"),
-            ).value,
+        room_left = room_for_longer(
+            error, group.error_aim, quadrature_error, group.quadrature_error_aim, limited
         )
-        self.set_factor()
-        length = w.h * self.factor
-        t, low = time_after(self.row("t0"), self.row("time_low"), w.h)
-        time_left, since = (self.row("stop") - t) - low, self.row("since") + 1.0
-        good = self.all(
-            good,
-            self.certain,
-            self.free,
-            (time_left * length).compare(">", 0.0),
-            time_left.absolute().compare(">", length.absolute()),
-            length.absolute().compare("<=", self.number("longest")),
-            is_distinct(length, t).value,
-            since.compare("<", self.row("unwatched")),
+        free = (factor >= LIMITED_GROWTH) | ((room_left <= group.worth) & visible)
+        following = h * factor
+        t, low = time_after(as_rows(group.t0, lanes)[0], as_rows(group.time_low, lanes)[0], h)
+        time_left, since = (as_rows(group.stop, lanes)[0] - t) - low, as_rows(group.since, lanes)[0] + 1.0
+        good = (
+            good
+            & certain
+            & opposite(in_doubt)
+            & free
+            & (time_left * following > 0.0)
+            & (size(time_left) > size(following))
+            & (size(following) <= group.longest)
+            & is_distinct(following, t)
+            & (since < as_rows(group.unwatched, lanes)[0])
         )
-        w.put(w.unity.where(good, 0.0), w.array(slots["ordinary"]))
-        news = {
-            "t0": t, "time_low": low, "previous_error": self.error,
-            "previous_quadrature_error": self.quadrature_error,
-            "previous_length": w.h, "length_limit": self.limit, "h": length, "ratio": self.factor,
-            "begin": w.unity, "before": Value(b, b.load(w.iterations)), "since": since,
-        }  # fmt: skip
-        for name, value in news.items():
-            w.put(value.where(good, self.row(name)), w.array(slots[name]))
-        rows = w.form.rows
-        dim = rows * (2 if w.form.second else 1)
-        ends, last_coefficients = w.array(slots["ends"]), w.array(slots["last_coefficients"])
-        moves = ("next_state", w.state, dim), ("next_error", w.error, dim)
-        for ahead, now, count in (
-            *moves,
-            ("next_ends", ends, rows),
-            ("next_last_coefficients", last_coefficients, rows),
-        ):
-            source = w.array(slots[ahead])
+        as_rows(group.ordinary, lanes)[0] = where(good, 1.0, 0.0)
+        keep(group.t0, good, t)
+        keep(group.time_low, good, low)
+        keep(group.previous_error, good, error)
+        keep(group.previous_quadrature_error, good, quadrature_error)
+        keep(group.previous_length, good, h)
+        keep(group.length_limit, good, limit)
+        keep(group.h, good, following)
+        keep(group.ratio, good, factor)
+        keep(group.begin, good, 1.0)
+        keep(group.before, good, iterations)
+        keep(group.since, good, since)
+        keep_rows(group.state, good, group.next_state, dim)
+        keep_rows(group.error, good, group.next_error, dim)
+        keep_rows(group.ends, good, group.next_ends, rows)
+        keep_rows(group.last_coefficients, good, group.next_last_coefficients, rows)
 
-            def move(d: Any, source: Any = source, now: Any = now) -> None:
-                w.put(w.get(source, d).where(good, w.get(now, d)), now, d)
-
-            w.each(count, move)
+    return end_step

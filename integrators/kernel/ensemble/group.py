@@ -62,6 +62,7 @@ class Group(Memory):
 
     # --- adaptive steps ---
     to_legendre = Array()  # values -> Legendre coefficients, (k, k)
+    in_powers = Array()  # Legendre polynomials as powers of x, and at the end; see `prepared.in_powers`
     ratio = Array("lanes")  # of the length to that of the step that `values` belong to; 0: none
     begin = Array("lanes")  # where on that step this one begins: at its end, 1, or at its start, 0
     next_state = Array("dim", "lanes")

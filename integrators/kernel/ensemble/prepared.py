@@ -1,7 +1,8 @@
 """A method's coefficients for trajectories in lanes, and the memory of groups of them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any, TypeVar
 
 import numpy as np
@@ -9,12 +10,10 @@ from numpy.typing import NDArray
 
 from integrators.kernel import tables
 from integrators.kernel.context import width_of_blocks
-from integrators.kernel.engines import run, run_own
-from integrators.kernel.ensemble import steps
+from integrators.kernel.engines import lanes, run, run_own
+from integrators.kernel.ensemble.form import JUDGED, Form
 from integrators.kernel.ensemble.group import Group
-from integrators.kernel.ensemble.steps import Blocks, Form, Steps
 from integrators.kernel.native import binary, machine
-from integrators.kernel.native.field import compile_around
 from integrators.kernel.native.memory import Numbers, aligned
 from integrators.kernel.tables import Constants
 from problems import targets
@@ -28,6 +27,8 @@ SHORT_LATENCY = ("const", "symbol", "index", "add", "sub", "mul", "neg", "pow", 
 STAGES = 16  # at most: their sums are unrolled
 UNROLLED = 640  # products of an iteration that are written out, at most
 FEW_ROWS, FEW_CALLS = 4, 3  # where both are exceeded, no products are written out
+# Operations of the field at all stages, at most, a function being so many: LLVM unrolls no longer loops
+OPERATIONS, CALL = 4000, 40
 ROOM = 4096  # rows of all stages, at most: beyond, a group of trajectories does not fit in the nearest caches
 
 Result = TypeVar("Result")
@@ -58,30 +59,35 @@ class Lanes:
     def __init__(self, system: System, constants: Constants, second: bool, unit: bool, varying: bool):
         self.rows = system.dof if second and system.dof is not None else system.dim
         self.dim, self.parameters = system.dim, system.n_par
-        groups = groups_of(system, second, self.rows)
-        self._compile(system, constants, "force" if second else "field", second, unit, varying, groups)
+        blocks = blocks_of(system, second, self.rows)
+        self._compile(system, constants, "force" if second else "field", second, unit, varying, blocks)
 
     def _compile(
         self, system: System, constants: Constants, quantity: targets.Quantity, second: bool, unit: bool,
-        varying: bool, groups: Blocks, vectors: Blocks = (),
+        varying: bool, blocks: dict[str, int], vectors: Mapping[str, int] = MappingProxyType({}),
     ) -> None:  # fmt: skip
         """Compile the steps around a function of stages of `rows` components."""
         self.system, self.second, self._constants = system, second, constants
         self.unit, self.varying, self.k = unit and not varying, varying, constants.k
         self.width = width_for(system, second, self.rows, varying)
-        judged = tables.degrees_judged(constants.k, constants.s)
         unrolled = unrolled_for(system, second, self.k, self.rows)
-        form = Form(
-            self.width, self.k, self.rows, second, self.unit, varying, unrolled, judged, groups, vectors
-        )
-        self._code = compile_around(
+        degrees = tables.degrees_judged(constants.k, constants.s)
+        numbers = {
+            "k": self.k, "rows": self.rows, "second": second, "unit": self.unit, "varying": varying,
+            "unrolled": unrolled, "held": unrolled and machine.many_registers(),
+            **{f"blocks.{name}": value for name, value in blocks.items()},
+            **{f"vectors.{name}": value for name, value in vectors.items()},
+            **dict(zip(JUDGED, degrees, strict=True)),
+        }  # fmt: skip
+        form = Form(numbers, {})
+        self._code = lanes.code(
             system,
             quantity,
-            form.lanes,
-            steps.__name__,
-            form,
-            lambda inner: Steps(inner, form).text(),
+            self.width,
+            (self.width,),
+            constants=form.words.tolist(),
             par=True,
+            unrolled=unrolled,
         )
         loop = (run_own if varying else run).code()
         self.from_cache = self._code.from_cache and loop.from_cache
@@ -100,7 +106,8 @@ class Lanes:
         names = ("nodes", "nodes_low", "weights", "weights_low", "position_weights", "position_weights_low")
         extrapolation = a["extrapolation_basis"][:, : tables.MODES] @ a["to_legendre"][: tables.MODES]
         chosen = {name: a[name] for name in names} | {"extrapolation": extrapolation}
-        chosen["to_legendre"] = a["to_legendre"]
+        if self.varying:
+            chosen |= {"to_legendre": a["to_legendre"], "in_powers": in_powers(self.k)}
         return {name: _aligned(values) for name, values in chosen.items()}
 
     def _matrix(self, h: float) -> Numbers:
@@ -164,11 +171,27 @@ class Lanes:
         return group, partial
 
 
-def groups_of(system: System, second: bool, rows: int) -> Blocks:
-    """Return the groups of blocks of a stage of so many components, as `Form.groups` has them."""
-    width = width_of_blocks(system)
-    starts = [0] if second or system.dof is None else [0, system.dof]
-    return tuple((start, rows // len(starts) // width, width) for start in starts)
+def blocks_of(system: System, second: bool, rows: int) -> dict[str, int]:
+    """Return the blocks of a stage of so many components, as `ensemble.form.Blocks` has them."""
+    width, groups = width_of_blocks(system), 1 if second or system.dof is None else 2
+    return {"first": 0, "groups": groups, "count": rows // groups // width, "width": width}
+
+
+def in_powers(k: int) -> Numbers:
+    """Return powers of x in Legendre polynomials on [-1, 1], orthonormal on [0, 1].
+
+    Returns
+    -------
+    ndarray, shape (k + 1, k)
+        For each power below k its factor in the polynomial of each degree; then the polynomials at 1.
+    """
+    from numpy.polynomial.legendre import leg2poly  # takes its time, and is needed for adaptive steps only
+
+    factors = np.zeros((k + 1, k))
+    for j in range(k):
+        factors[k, j] = np.sqrt(2.0 * j + 1.0)
+        factors[: j + 1, j] = leg2poly([0.0] * j + [factors[k, j]])
+    return factors
 
 
 def width_for(system: System, second: bool, rows: int, varying: bool) -> int:
@@ -202,7 +225,7 @@ def unrolled_for(system: System, second: bool, k: int, rows: int) -> bool:
     nodes = reachable(system.function("force" if second else "field").roots)
     called = [node for node in nodes if node.op in FUNCTIONS and node.op != "sqrt"]
     calls = sum(len(node.loop) if node.loop else 1 for node in called)
-    in_loops = rows > FEW_ROWS and calls > FEW_CALLS
+    in_loops = (rows > FEW_ROWS and calls > FEW_CALLS) or k * (len(nodes) + CALL * calls) > OPERATIONS
     return k * k * rows <= UNROLLED and not in_loops
 
 

@@ -1,6 +1,6 @@
 """Steps of HBVM(k, s) on trajectories in lanes, compiled around the field of one system.
 
-Every number of a step is a vector, with one trajectory in each lane, so that there is nothing to shuffle and
+Every number of a step is a row, with one trajectory in each lane, so that there is nothing to shuffle and
 no sum over lanes. Stages come one after another; each uses the values that the field has had at the stages
 before it in the same iteration (Gauss and Seidel). The arithmetic is that of `integrators.kernel.step`:
 nodes, weights and the state are sums of two doubles, and what is at the size of the state is added last.
@@ -9,19 +9,19 @@ A trajectory whose iteration has ended keeps its values while the others iterate
 in a lane depends on nothing in the others.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
-from llvmlite import ir
-
-from integrators.kernel.ensemble.control import Control
+from integrators.kernel.ensemble.control import ends_of_steps
+from integrators.kernel.ensemble.form import Form
 from integrators.kernel.ensemble.group import Group
-from integrators.kernel.ensemble.writer import Index, Writer
-from integrators.kernel.native import machine
-from integrators.kernel.simd.emit import DOUBLE, INTEGER, splat, text_of
-from integrators.kernel.simd.operations import where
-from integrators.kernel.simd.values import Value
+from integrators.kernel.native.attributes import load_anew, view
+from integrators.kernel.native.jit import compiled
+from integrators.kernel.simd.lanes import everywhere, somewhere
+from integrators.kernel.simd.memory import call_field, larger
+from integrators.kernel.simd.operations import fma, greatest, opposite, size, two_sum, where
+from integrators.kernel.simd.views import as_numbers, as_rows
+from integrators.kernel.step.begin import INFINITY, on_previous_step
+from integrators.kernel.step.finish import added, moved_by
 from integrators.kernel.step.rule import (
     LOG_RESIDUAL,
     LOG_RESIDUAL_VARYING,
@@ -29,525 +29,367 @@ from integrators.kernel.step.rule import (
     STAGNATION,
     TOLERANCE,
 )
+from integrators.kernel.step.size import inverse_sizes, least_part
+from integrators.kernel.step.stopping import further, judge, residual_at_end, stagnates
+from integrators.kernel.step.sums import multiplied, part_of_drift, time_of_step
+from problems.targets.called import room
 
-INFINITY = float("inf")
-ROWS_AT_A_TIME = 2  # rows of a product side by side: their sums stay in registers, and share its matrix
+group_at, form_at = view(Group), view(Form)
 
 
-Blocks = tuple[tuple[int, int, int], ...]
-"""First row, number of blocks and rows of a block, of groups of blocks."""
+@compiled
+def combination(form, table, i, values, last, d, start, starts):
+    """Return ``sum_j table[i, j] values[j, d]``, added to ``start`` if it ``starts``.
+
+    Where that is unrolled the value of the stage before comes last, as ``last``: the newest one, which all
+    the rest need not wait for.
+    """
+    k, rows, unrolled = form.k, form.rows, form.unrolled
+    total = start
+    for m in range(k):
+        j = i + m if unrolled else m
+        if j >= k:
+            j -= k
+        value = last if unrolled and m == k - 1 else values[rows * j + d]
+        total = fma(table[k * i + j], value, total) if starts or m > 0 else table[k * i + j] * value
+    return total
 
 
-@dataclass(frozen=True)
-class Form:
-    """What the code of a step depends on besides the field.
+def measuring(lanes: int, own: Any) -> Any:
+    """Return what sets the weights that turn changes of the values into those of the stages beside a block.
 
-    Attributes
-    ----------
-    lanes, k, rows : int
-        Trajectories side by side, stages, components of a stage.
-    second : bool
-        Second-order form: stages hold positions, the state is (q, p).
-    unit : bool
-        Whether the rows' factors h q' / p are in the matrix.
-    varying : bool
-        Whether every lane has a step of its own length. The matrix is that of a step of 1, the end of the
-        step goes to `Group.next_state`, and a lane whose equations are not solved is not alive then.
-    unrolled : bool
-        Whether stages and rows are unrolled; see `ensemble.prepared.unrolled_for`.
-    judged : tuple of int
-        Degrees of the Legendre coefficients that such a step is judged by; see `tables.degrees_judged`.
-    groups : tuple of tuple of int
-        First row, number of blocks and rows of a block, of groups of blocks (positions, momenta).
-    vectors : tuple of tuple of int
-        The same of tangent vectors, which may begin at 0: they are measured after each iteration.
+    ``own(form, group, values, h, d, weight)`` is the size of a component and how far it moves. The size of a
+    block is the largest of its components'. Where every row is a block and the step size fixed, floored sizes
+    are at least how far a row of the group moves, as in `integrators.kernel.step.size.take_sizes`.
     """
 
-    lanes: int
-    k: int
-    rows: int
-    second: bool
-    unit: bool
-    varying: bool
-    unrolled: bool
-    judged: tuple[int, ...]
-    groups: Blocks
-    vectors: Blocks = ()
-
-
-class Steps(Writer):
-    """Writes LLVM's text of ``void(group, count)``, so many steps of a `Group`, around a field on lanes."""
-
-    # Where the arrays of `Group` are, by their names there.
-    nodes: Any
-    nodes_low: Any
-    weights: Any
-    weights_low: Any
-    position_weights: Any
-    position_weights_low: Any
-    state: Any
-    error: Any
-    velocity: Any
-    par: Any
-    factor: Any
-    moved: Any
-    block_weights: Any
-    floored_weights: Any
-    size: Any
-    stage: Any
-    field_values: Any
-
-    def __init__(self, inner: str, form: Form):
-        super().__init__(inner, form.lanes, unrolled=form.unrolled)
-        self.form = form
-
-    def text(self) -> str:
-        """Return the module."""
-        b, form = self.b, self.form
-        k, rows = form.k, form.rows
-        count = self.function.args[1]
-        self.zero = Value(b, ir.Constant(self.kind, [0.0] * form.lanes))
-        self.unity = self.zero.constant(1.0)
-        slots = Group.slots
-        for name in (
-            "nodes",
-            "nodes_low",
-            "weights",
-            "weights_low",
-            "position_weights",
-            "position_weights_low",
-        ):
-            setattr(self, name, self.array(slots[name]))
-        for name in ("state", "error", "velocity", "par"):
-            setattr(self, name, self.array(slots[name]))
-        for name in ("factor", "moved", "block_weights", "floored_weights", "size", "stage", "field_values"):
-            setattr(self, name, self.room(slots[name], rows))
-        self.held = self.unrolled and machine.many_registers()
-        self.values = self.room(slots["values"], k * rows) if self.held else self.array(slots["values"])
-        self.ahead = self.array(slots["ahead"]) if form.varying else self.room(slots["ahead"], k * rows)
-        self.base = self.array(slots["base"])
-        kept = self.array(slots["values"])
-        pointer = DOUBLE.as_pointer()
-        self.result, self.exception = b.alloca(pointer), b.alloca(pointer)
-        self.h = self.get(self.array(slots["h"]))
-        if self.held:
-            self.each(k * rows, lambda i: self.put(self.get(kept, i), self.values, i))
-        alive = self.get(self.array(slots["alive"]))
-        self.alive = self.variable(self.bits, alive.compare("!=", 0.0))
-        self.iterations, self.rate = (
-            self.variable(self.kind, self.get(self.array(slots[name])).value)
-            for name in ("iterations", "rate")
-        )
-        taken = self.variable(INTEGER, ir.Constant(INTEGER, 0))
-        loop, end = self.function.append_basic_block("step"), self.function.append_basic_block("done")
-        b.branch(loop)
-        b.position_at_end(loop)
-        self.step()
-        steps = b.add(b.load(taken), ir.Constant(INTEGER, 1))
-        b.store(steps, taken)
-        b.store(b.add(b.load(self.word(slots["n"])), ir.Constant(INTEGER, 1)), self.word(slots["n"]))
-        living = self.any(b.load(self.alive))
-        b.cbranch(b.and_(living, b.icmp_signed("<", steps, count)), loop, end)
-        b.position_at_end(end)
-        if self.held:
-            self.each(k * rows, lambda i: self.put(self.get(self.values, i), kept, i))
-        self.put(self.unity.where(b.load(self.alive), 0.0), self.array(slots["alive"]))
-        for variable, name in ((self.iterations, "iterations"), (self.rate, "rate")):
-            self.put(Value(b, b.load(variable)), self.array(slots[name]))
-        b.store(b.zext(self.any(b.load(self.alive)), INTEGER), self.word(slots["living"]))
-        b.ret_void()
-        return text_of(self.module)
-
-    def step(self) -> None:
-        """Write one step of all lanes."""
-        self.begin()
-        self.sizes()
-        self.predict()
-        self.iterate()
-        self.finish()
-        if self.form.varying:
-            Control(self).take()
-
-    def each_row(self, body: Callable[[Any], None]) -> None:
-        """Write ``body(d)`` for every component of a stage."""
-        self.each(self.form.rows, body)
-
-    def begin(self) -> None:
-        """Set what stages have besides the state and the values, and the time of the step."""
-        from integrators.kernel.step.sums import part_of_drift, time_of_step  # imports numba
-
-        b, form = self.b, self.form
-
-        def row(d: Index) -> None:
-            error = self.get(self.error, d)
-            if not form.second:
-                if form.varying:
-                    self.put(self.h, self.factor, d)
-                self.each(form.k, lambda i: self.put(error, self.base, self.at(i, form.rows, d)))
-                return
-            kh = self.h * self.get(self.velocity, d)
-            if not form.unit:
-                self.put(self.h * kh if form.varying else kh, self.factor, d)
-            drift = self.drift(d, kh)
-
-            def stage(i: Index) -> None:
-                c, c_low = self.number(self.nodes, i), self.number(self.nodes_low, i)
-                self.put(part_of_drift(c, c_low, *drift, error), self.base, self.at(i, form.rows, d))
-
-            self.each(form.k, stage)
-
-        self.each_row(row)
-        slots = Group.slots
-        n = Value(b, splat(b, b.sitofp(b.load(self.word(slots["n"])), DOUBLE), form.lanes))
-        t0, time_low = (self.get(self.array(slots[name])) for name in ("t0", "time_low"))
-        self.t, self.t_low = time_of_step(t0, time_low, n, self.h)
-
-    def drift(self, d: Index, kh: Value) -> tuple[Value, Value]:
-        """Return kh (p + its error) as a sum of two doubles."""
-        from integrators.kernel.step.sums import multiplied  # imports numba
-
-        momentum = self.at(1, self.form.rows, d)
-        return multiplied(kh, self.get(self.state, momentum), self.get(self.error, momentum))
-
-    def sizes(self) -> None:
-        """Set what a change of the values is: that of the stages which follows from it, beside their block.
-
-        The size of a block is the largest at the start of the step and, about, at its end. Where every row is
-        a block and the step size fixed, floored_change sizes are at least how far a row of the group moves,
-        as in `integrators.kernel.step.size.take_sizes`.
-        """
-        self.invert_sizes(self.form.groups, lambda d, _: self.component_size(d))
-
-    def sizes_of_vectors(self) -> None:
-        """Set the same of tangent vectors, which are also as large as the newest values move the stages."""
-
-        def own(d: Index, weight: Value) -> tuple[Value, Value]:
-            last = self.get(self.values, self.at(self.form.k - 1, self.form.rows, d))
-            size, moved = self.component_size(d)
-            return size.max((weight * last).absolute()), moved
-
-        self.invert_sizes(self.form.vectors, own)
-
-    def component_size(self, d: Index) -> tuple[Value, Value]:
-        """Return the size of a component at the start and, about, at the end of a step; and its movement."""
-        y = self.get(self.state, d)
-        if self.form.second:
-            moved, _ = self.drift(d, self.h * self.get(self.velocity, d))
-        else:
-            moved = self.h * self.get(self.values, self.at(self.form.k - 1, self.form.rows, d))
-        return y.absolute().max((y + moved).absolute()), moved.absolute()
-
-    def invert_sizes(self, groups: Blocks, own: Callable[[Index, Value], tuple[Value, Value]]) -> None:
-        """Write the weights of changes in groups of blocks, by ``own(d, weight)``.
-
-        That is the size of a component, and how far it moves. The weight turns a change of the values into
-        one of the stages.
-        """
-        from integrators.kernel.step.size import inverse_sizes, least_part  # imports numba
-
-        form = self.form
-        least = least_part(form.varying)
-        matrix_norm = Value(
-            self.b, splat(self.b, self.b.load(self.word(Group.slots["matrix_norm"], DOUBLE)), form.lanes)
-        )
-
-        def weight_of(d: Index) -> Value:
-            return matrix_norm if form.unit else self.get(self.factor, d).absolute() * matrix_norm
-
-        for first, blocks, width in groups:
-            tops = largest, farthest = [self.variable(self.kind, self.zero.value) for _ in range(2)]
-
-            def measure(block: Index, first: int = first, width: int = width, tops: Any = tops) -> None:
-                start = self.at(block, width, first)
-                size = self.zero
-                for i in range(width):
-                    d = self.at(start, 1, i)
-                    component_size, moved = own(d, weight_of(d))
-                    size = size.max(component_size)
+    @compiled
+    def measure(form, blocks, group, h, factor, values, sizes, block_weights, floored_weights):
+        zero = everywhere(0.0, h)
+        least, norm = least_part(form.varying), group.matrix_norm
+        count, width = blocks.count, blocks.width
+        for g in range(blocks.groups):
+            largest, farthest = zero, zero
+            for b in range(count):
+                start = blocks.first + (g * count + b) * width
+                top = zero
+                for d in range(start, start + width):
+                    weight = everywhere(norm, h) if form.unit else size(factor[d]) * norm
+                    extent, moved = own(form, group, values, h, d, weight)
+                    top = greatest(top, extent)
                     if width == 1 and not form.varying:
-                        self.b.store(self.load(tops[1]).max(moved).value, tops[1])
-                self.put(size, self.size, start)
-                self.b.store(self.load(tops[0]).max(size).value, tops[0])
+                        farthest = greatest(farthest, moved)
+                sizes[start] = top
+                largest = greatest(largest, top)
+            for b in range(count):
+                start = blocks.first + (g * count + b) * width
+                inverse, floored = inverse_sizes(sizes[start], largest, least, zero, farthest)
+                for d in range(start, start + width):
+                    weight = everywhere(norm, h) if form.unit else size(factor[d]) * norm
+                    block_weights[d] = weight * inverse
+                    floored_weights[d] = weight * floored
 
-            self.each(blocks, measure)
-            tops = self.load(largest), self.load(farthest)
+    return measure
 
-            def invert(block: Index, first: int = first, width: int = width, tops: Any = tops) -> None:
-                start = self.at(block, width, first)
-                inverses = inverse_sizes(self.get(self.size, start), tops[0], least, self.zero, tops[1])
-                for i in range(width):
-                    d = self.at(start, 1, i)
-                    weight = weight_of(d)
-                    self.put(weight * inverses[0], self.block_weights, d)
-                    self.put(weight * inverses[1], self.floored_weights, d)
 
-            self.each(blocks, invert)
+def steps(lanes: int) -> Any:
+    """Return ``void(field, form, group, count)``, so many steps of a `Group` around a field."""
+    end_step = ends_of_steps(lanes)
 
-    def combination(
-        self, table: Any, i: Index, values: Any, known: dict[Index, Value] | None = None
-    ) -> Callable[..., list[Value]]:
-        """Return what makes ``sum_j table[i, j] values[j, d]`` for rows d, each added to a start.
+    @compiled
+    def drift(form, group, d, kh):
+        """Return kh (p + its error) as a sum of two doubles."""
+        rows = form.rows
+        state, error = as_rows(group.state, lanes), as_rows(group.error, lanes)
+        return multiplied(kh, state[rows + d], error[rows + d])
 
-        Values that are ``known`` by their index are not loaded.
-        """
-        k, rows = self.form.k, self.form.rows
-        factors = [self.number(table, self.at(i, k, j)) for j in range(k)]
+    @compiled
+    def component_size(form, group, values, h, d, weight):
+        """Return the size of a component at the start and, about, at the end of a step; and its movement."""
+        y = as_rows(group.state, lanes)[d]
+        if form.second:
+            moved, _ = drift(form, group, d, h * as_rows(group.velocity, lanes)[d])
+        else:
+            moved = h * values[form.rows * (form.k - 1) + d]
+        return greatest(size(y), size(y + moved)), size(moved)
 
-        # The newest value comes last: all the rest need not wait for it.
-        order = [*range(i, k), *range(i)] if isinstance(i, int) else [*range(k)]
+    @compiled
+    def vector_size(form, group, values, h, d, weight):
+        """As `component_size`; a vector is also as large as the newest values move the stages."""
+        extent, moved = component_size(form, group, values, h, d, weight)
+        return greatest(extent, size(weight * values[form.rows * (form.k - 1) + d])), moved
 
-        def totals(some: list[Index], starts: list[Value] | None = None) -> list[Value]:
-            for j in order:
-                indices = [self.at(j, rows, d) for d in some]
-                factor = factors[j]
-                operands = [known[p] if known and p in known else self.get(values, p) for p in indices]
-                if starts is None:
-                    starts = [factor * value for value in operands]
-                else:
-                    starts = [factor.fma(value, start) for value, start in zip(operands, starts, strict=True)]
-            assert starts is not None
-            return starts
+    measure = measuring(lanes, component_size)
+    measure_vectors = measuring(lanes, vector_size)
 
-        return totals
+    @compiled
+    def begin(form, group, h, factor):
+        """Set what stages have besides the state and the values; return the time of the step."""
+        k, rows, second, varying = form.k, form.rows, form.second, form.varying
+        error, velocity, base = (
+            as_rows(group.error, lanes),
+            as_rows(group.velocity, lanes),
+            as_rows(group.base, lanes),
+        )
+        for d in range(rows):
+            lacks = error[d]
+            if second:
+                kh = h * velocity[d]
+                if not form.unit:
+                    factor[d] = h * kh if varying else kh
+                moved, moved_low = drift(form, group, d, kh)
+                for i in range(k):
+                    base[rows * i + d] = part_of_drift(
+                        group.nodes[i], group.nodes_low[i], moved, moved_low, lacks
+                    )
+            else:
+                if varying:
+                    factor[d] = h
+                for i in range(k):
+                    base[rows * i + d] = lacks
+        t0, low = as_rows(group.t0, lanes)[0], as_rows(group.time_low, lanes)[0]
+        return time_of_step(t0, low, float(group.n), h)
 
-    def few_rows(self, body: Callable[[list[Index]], None]) -> None:
-        """Write ``body`` for `ROWS_AT_A_TIME` components of a stage at a time."""
-        if not self.unrolled:
-            self.each_row(lambda d: body([d]))
-            return
-        for first in range(0, self.form.rows, ROWS_AT_A_TIME):
-            body([*range(first, min(first + ROWS_AT_A_TIME, self.form.rows))])
-
-    def predict(self) -> None:
-        """First values: the last step's polynomial at the nodes of this one."""
-        k, rows = self.form.k, self.form.rows
-        if self.form.varying:
-            self.predict_from_polynomial()
-            return
-        table = self.table(Group.slots["extrapolation"])
-
-        def stage(i: Index) -> None:
-            totals = self.combination(table, i, self.values)
-
-            def ahead(some: list[Index]) -> None:
-                for d, total in zip(some, totals(some), strict=True):
-                    self.put(total, self.ahead, self.at(i, rows, d))
-
-            self.few_rows(ahead)
-
-        self.each(k, stage)
-        self.each(k * rows, lambda i: self.put(self.get(self.ahead, i), self.values, i))
-
-    def predict_from_polynomial(self) -> None:
-        """As `predict`, from the powers of the polynomial: this step's length may be another one."""
-        from integrators.kernel.step.begin import on_previous_step  # imports numba
-
-        slots, k, rows = Group.slots, self.form.k, self.form.rows
-        ratio, begin = (self.get(self.array(slots[name])) for name in ("ratio", "begin"))
-        there = ratio.compare("!=", 0.0)
-
-        def stage(i: Index) -> None:
-            x = on_previous_step(self.number(self.nodes, i), begin, ratio)
-
-            def row(d: Index) -> None:
-                powers = [self.get(self.ahead, self.at(j, rows, d)) for j in range(k)]
-                self.put(x.polynomial(powers).where(there, 0.0), self.values, self.at(i, rows, d))
-
-            self.each_row(row)
-
-        self.each(k, stage)
-
-    def iterate(self) -> None:
-        """Iterate until every lane is solved, or has left."""
-        b, form = self.b, self.form
-        infinite = self.zero.constant(INFINITY).value
-        none = ir.Constant(self.bits, [0] * form.lanes)
-        self.last, self.best = self.variable(self.kind, infinite), self.variable(self.kind, infinite)
-        self.stalled = self.variable(self.kind, self.zero.value)
-        # Iterations still to be made; infinite: that is not known
-        self.left = self.variable(self.kind, infinite)
-        self.again = self.variable(self.bits, none)
-        self.active = self.variable(self.bits, b.load(self.alive))
-        self.tried = self.variable(INTEGER, ir.Constant(INTEGER, 0))
-        loop, end = self.function.append_basic_block("iteration"), self.function.append_basic_block("solved")
-        b.branch(loop)
-        b.position_at_end(loop)
-        self.iteration()
-        self.rule()
-        b.cbranch(self.any(b.load(self.active)), loop, end)
-        b.position_at_end(end)
-
-    def iteration(self) -> None:
-        """Set new values at all stages, one after another, and how much they have changed."""
-        b, form = self.b, self.form
+    @compiled
+    def at(form, x, powers, d):
+        """Return the polynomial of row d at x."""
         k, rows = form.k, form.rows
-        active = b.load(self.active)
-        matrix = self.table(Group.slots["matrix"])
-        newest: dict[Index, Value] = {}  # of the stage before, which is waited for
-        self.each_row(lambda d: self.put(self.zero, self.moved, d))
+        total = powers[rows * (k - 1) + d]
+        for j in range(k - 1):
+            total = fma(total, x, powers[rows * (k - 2 - j) + d])
+        return total
 
-        def stage(i: Index) -> None:
+    @compiled
+    def predict(form, group, values, ahead):
+        """Set first values: the last step's polynomial at the nodes of this one."""
+        k, rows = form.k, form.rows
+        if form.varying:
+            predict_from_polynomial(form, group, values, ahead)
+            return
+        table = load_anew(group, "extrapolation")
+        for i in range(k):
+            for d in range(rows):
+                last = values[rows * (i - 1 if i > 0 else k - 1) + d]
+                ahead[rows * i + d] = combination(form, table, i, values, last, d, last, False)
+        for i in range(k * rows):
+            values[i] = ahead[i]
+
+    @compiled
+    def predict_from_polynomial(form, group, values, ahead):
+        """As `predict`, from the powers of the polynomial: this step's length may be another one."""
+        k, rows = form.k, form.rows
+        ratio, start = as_rows(group.ratio, lanes)[0], as_rows(group.begin, lanes)[0]
+        nowhere = ratio == 0.0
+        for i in range(k):
+            x = on_previous_step(group.nodes[i], start, ratio)
+            for d in range(rows):
+                values[rows * i + d] = where(nowhere, 0.0, at(form, x, ahead, d))
+
+    @compiled
+    def iteration(
+        field, form, group, t, t_low, h, active, factor, kept, moved, stage, field_values, newest, time
+    ):
+        """Set new values at all stages, one after another, and how much they have changed."""
+        k, rows, unit, unrolled = form.k, form.rows, form.unit, form.unrolled
+        base, state, matrix = (
+            as_rows(group.base, lanes),
+            as_rows(group.state, lanes),
+            load_anew(group, "matrix"),
+        )
+        for d in range(rows):
+            moved[d] = 0.0
+        for i in range(k):
             # Its address is loaded anew for each stage of few: the compiler would keep all values, of which
             # registers hold a few, and spend as much on moving them as on the products.
-            values = self.values if self.held or not self.unrolled else self.table(Group.slots["values"])
-            totals = self.combination(matrix, i, values, dict(newest))
-            newest.clear()
+            values = kept if form.held or not unrolled else as_rows(load_anew(group, "values"), lanes)
+            for d in range(rows):
+                start = base[rows * i + d]
+                last = newest[d] if i > 0 else values[rows * (k - 1) + d]
+                total = combination(form, matrix, i, values, last, d, start, unit)
+                stage[d] = state[d] + (total if unit else fma(factor[d], total, start))
+            time[0] = t + fma(group.nodes[i], h, t_low)
+            call_field(field, as_numbers(time), as_numbers(stage), group.par, as_numbers(field_values))
+            for d in range(rows):
+                old, new = values[rows * i + d], field_values[d]
+                moved[d] = larger(moved[d], size(new - old))
+                kept_value = where(active, new, old)
+                values[rows * i + d] = kept_value
+                if unrolled:
+                    newest[d] = kept_value
 
-            def displace(some: list[Index]) -> None:
-                bases = [self.get(self.base, self.at(i, rows, d)) for d in some]
-                for d, total, base in zip(
-                    some, totals(some, bases if form.unit else None), bases, strict=True
-                ):
-                    moved = total if form.unit else self.get(self.factor, d).fma(total, base)
-                    self.put(self.get(self.state, d) + moved, self.stage, d)
+    @compiled
+    def largest_change(form, moved, weights, zero):
+        """Return the largest of the changes of all rows."""
+        top = zero
+        for d in range(form.rows):
+            top = larger(top, size(moved[d] * weights[d]))
+        return top
 
-            self.few_rows(displace)
-            time = self.t + self.number(self.nodes, i).fma(self.h, self.t_low)
-            b.call(
-                self.field, [self.result, self.exception, time.value, self.stage, self.par, self.field_values]
-            )
+    @compiled
+    def mean(form, values, d, high, low, zero):
+        """Return the mean of row d of the values with weights high + low, as a sum of two doubles."""
+        k, rows = form.k, form.rows
+        middle = k // 2
+        first, last = zero, zero
+        for j in range(middle):
+            first = fma(low[j], values[rows * j + d], first)
+        for j in range(middle):
+            first = fma(high[j], values[rows * j + d], first)
+        for j in range(middle, k):
+            last = fma(low[j], values[rows * j + d], last)
+        for j in range(middle, k):
+            last = fma(high[j], values[rows * j + d], last)
+        return two_sum(first, last)
 
-            def keep(d: Index) -> None:
-                index = self.at(i, rows, d)
-                old, new = self.get(values, index), self.get(self.field_values, d)
-                self.put(self.get(self.moved, d).larger((new - old).absolute()), self.moved, d)
-                kept = new.where(active, old)
-                self.put(kept, values, index)
-                if self.unrolled:
-                    newest[index] = kept
+    @compiled
+    def keep(form, group, d, new, low, alive):
+        """Set a component at the end of the step in lanes that are alive, and return which still are."""
+        state, error = as_rows(group.state, lanes), as_rows(group.error, lanes)
+        next_state = as_rows(group.next_state, lanes) if form.varying else state
+        next_error = as_rows(group.next_error, lanes) if form.varying else error
+        # The last iterations are not judged: in one component of a lane they may have left no number.
+        good = alive & (new - new == 0.0)
+        next_state[d] = where(good, new, state[d])
+        next_error[d] = where(good, low, error[d])
+        return good
 
-            self.each_row(keep)
+    @compiled
+    def finish(form, group, values, h, alive):
+        """Set the state at the end, as a sum of two doubles, the displacement first; return who is alive."""
+        rows, second = form.rows, form.second
+        state, error, zero = as_rows(group.state, lanes), as_rows(group.error, lanes), everywhere(0.0, h)
+        for d in range(rows):
+            y, lacks = state[d], error[d]
+            force, force_low = mean(form, values, d, group.weights, group.weights_low, zero)
+            if second:
+                kh = h * as_rows(group.velocity, lanes)[d]
+                moved, moved_low = drift(form, group, d, kh)
+                p, p_lacks = state[rows + d], error[rows + d]
+                kick, kick_low = mean(
+                    form, values, d, group.position_weights, group.position_weights_low, zero
+                )
+                new, low = moved_by(y, lacks, moved, moved_low, h, kh, kick, kick_low)
+                alive = keep(form, group, d, new, low, alive)
+                new, low = added(p, p_lacks, h, force, force_low)
+                alive = keep(form, group, rows + d, new, low, alive)
+            else:
+                new, low = added(y, lacks, h, force, force_low)
+                alive = keep(form, group, d, new, low, alive)
+        return alive
 
-        self.each(k, stage)
+    @compiled
+    def run(field, constants, address, count):
+        group, form = group_at(address), form_at(constants)
+        rows, varying, unrolled, held = form.rows, form.varying, form.unrolled, form.held
+        of_stages = form.k * rows
+        log_residual = LOG_RESIDUAL_VARYING if varying else LOG_RESIDUAL
+        state, values = as_rows(group.state, lanes), as_rows(group.values, lanes)
+        # Rows are on the stack, in registers if possible, where loops are unrolled.
+        factor = room(state, rows) if unrolled else as_rows(group.factor, lanes)
+        moved = room(state, rows) if unrolled else as_rows(group.moved, lanes)
+        block_weights = room(state, rows) if unrolled else as_rows(group.block_weights, lanes)
+        floored_weights = room(state, rows) if unrolled else as_rows(group.floored_weights, lanes)
+        sizes = room(state, rows) if unrolled else as_rows(group.size, lanes)
+        stage = room(state, rows) if unrolled else as_rows(group.stage, lanes)
+        field_values = room(state, rows) if unrolled else as_rows(group.field_values, lanes)
+        kept = room(state, of_stages) if held else values
+        ahead = room(state, of_stages) if unrolled and not varying else as_rows(group.ahead, lanes)
+        newest, time = room(state, rows) if unrolled else values, room(state, 1)
+        h = as_rows(group.h, lanes)[0]
+        zero, infinite = everywhere(0.0, h), everywhere(INFINITY, h)
+        if held:
+            for i in range(of_stages):
+                kept[i] = values[i]
+        alive = as_rows(group.alive, lanes)[0] > 0.0
+        iterations, rate = as_rows(group.iterations, lanes)[0], as_rows(group.rate, lanes)[0]
+        taken = 0
+        while True:
+            t, t_low = begin(form, group, h, factor)
+            measure(form, form.blocks, group, h, factor, kept, sizes, block_weights, floored_weights)
+            predict(form, group, kept, ahead)
+            last, best, stalled = infinite, infinite, zero
+            left = infinite  # iterations still to be made; infinite: that is not known
+            again = zero > 0.0
+            active = alive
+            tried = 0
+            while True:
+                iteration(
+                    field,
+                    form,
+                    group,
+                    t,
+                    t_low,
+                    h,
+                    active,
+                    factor,
+                    kept,
+                    moved,
+                    stage,
+                    field_values,
+                    newest,
+                    time,
+                )
+                if form.vectors.groups:
+                    measure_vectors(
+                        form, form.vectors, group, h, factor, kept, sizes, block_weights, floored_weights
+                    )
+                tried += 1
+                iterations = where(active, iterations + 1.0, iterations)
+                left = left - 1.0
+                # A lane is not judged any more once it is known how many iterations are left. Where that is
+                # known of all, the end of the iteration need not wait for the rule.
+                undecided = active & (left >= INFINITY)
+                if somewhere(undecided):
+                    # What is judged is the change that the next iteration would make of the stages, beside
+                    # their block: bounded by that of the values.
+                    change = largest_change(form, moved, block_weights, zero)
+                    floored_change = largest_change(form, moved, floored_weights, zero)
+                    best, stalled, measured_rate, converged, residual = judge(
+                        change, last, best, stalled, rate, float(tried), TOLERANCE, 0.0
+                    )
+                    last = change
+                    over = converged | stagnates(floored_change, stalled, STAGNATION)
+                    remaining = further(
+                        residual_at_end(converged, residual, best), measured_rate, log_residual
+                    )
+                    left = where(undecided, where(over, remaining, INFINITY), left)
+                    rate = where(undecided, measured_rate, rate)
+                    failing = undecided & (left >= INFINITY)
+                    if not (tried == MOST_IN_LANES or (not varying and tried == 2 * MOST_IN_LANES)):
+                        failing = failing & opposite(change < INFINITY)
+                    if somewhere(failing):
+                        # A shorter step is tried, or this one without values where that has not been; else
+                        # the trajectory leaves.
+                        leaves = failing if varying else failing & again
+                        if not varying:
+                            anew = failing & opposite(again)
+                            again = again | anew
+                            last = where(anew, INFINITY, last)
+                            best = where(anew, INFINITY, best)
+                            left = where(anew, INFINITY, left)
+                            stalled = where(anew, 0.0, stalled)
+                            for i in range(of_stages):
+                                kept[i] = where(anew, 0.0, kept[i])
+                        active = active & opposite(leaves)
+                        alive = alive & opposite(leaves)
+                active = active & (left > 0.0)
+                if not somewhere(active):
+                    break
+            alive = finish(form, group, kept, h, alive)
+            if varying:
+                end_step(
+                    form, group, kept, h, alive, iterations, sizes, moved, block_weights, floored_weights
+                )
+            taken += 1
+            group.n += 1
+            if not somewhere(alive & (everywhere(float(count - taken), h) > 0.0)):
+                break
+        if held:
+            for i in range(of_stages):
+                values[i] = kept[i]
+        as_rows(group.alive, lanes)[0] = where(alive, 1.0, 0.0)
+        as_rows(group.iterations, lanes)[0] = iterations
+        as_rows(group.rate, lanes)[0] = rate
+        group.living = 1 if somewhere(alive) else 0
 
-    def rule(self) -> None:
-        """Count an iteration, and apply the stopping rule, in every lane by itself.
-
-        A lane is not judged any more once it is known how many iterations are left. Where that is known of
-        all, the end of the iteration need not wait for the rule.
-        """
-        b, form = self.b, self.form
-        if form.vectors:
-            self.sizes_of_vectors()
-        tried = b.add(b.load(self.tried), ir.Constant(INTEGER, 1))
-        b.store(tried, self.tried)
-        active, iterations, left = b.load(self.active), self.load(self.iterations), self.load(self.left) - 1.0
-        b.store((iterations + 1.0).where(active, iterations).value, self.iterations)
-        b.store(left.value, self.left)
-        undecided = b.and_(active, left.compare(">=", INFINITY))
-        with b.if_then(self.any(undecided)):
-            self.judge(undecided, tried)
-        b.store(b.and_(b.load(self.active), self.load(self.left).compare(">", 0.0)), self.active)
-
-    def judge(self, undecided: Any, tried: Any) -> None:
-        """Let lanes know how many iterations are left, where that has become known, and end those that fail.
-
-        What is judged is the change that the next iteration would make of the stages, beside
-        their block: bounded by that of the values.
-        """
-        # Imports numba
-        from integrators.kernel.step.stopping import further, judge, residual_at_end, stagnates
-
-        b, form = self.b, self.form
-        change, floored_change = (self.variable(self.kind, self.zero.value) for _ in range(2))
-
-        def largest(d: Index) -> None:
-            moved = self.get(self.moved, d)
-            for scales, top in ((self.block_weights, change), (self.floored_weights, floored_change)):
-                size = (moved * self.get(scales, d)).absolute()
-                b.store(self.load(top).larger(size).value, top)
-
-        self.each_row(largest)
-        largest_change, best, rate = self.load(change), self.load(self.best), self.load(self.rate)
-        count = Value(b, splat(b, b.sitofp(tried, DOUBLE), form.lanes))
-        best, stalled, rate, converged, residual = judge(
-            largest_change, self.load(self.last), best, self.load(self.stalled), rate, count, TOLERANCE, 0.0
-        )
-        over = converged | stagnates(self.load(floored_change), stalled, STAGNATION)
-        log_residual = LOG_RESIDUAL_VARYING if form.varying else LOG_RESIDUAL
-        more = where(over, further(residual_at_end(converged, residual, best), rate, log_residual), INFINITY)
-        left = more.where(undecided, self.load(self.left))
-        news = (
-            (self.last, largest_change),
-            (self.best, best),
-            (self.stalled, stalled),
-            (self.rate, rate.where(undecided, self.load(self.rate))),
-            (self.left, left),
-        )
-        for variable, value in news:
-            b.store(value.value, variable)
-
-        ends = (MOST_IN_LANES,) if form.varying else (MOST_IN_LANES, 2 * MOST_IN_LANES)
-        over = [b.icmp_signed("==", tried, ir.Constant(INTEGER, n)) for n in ends]
-        all_of_them, none = (ir.Constant(undecided.type, [bit] * form.lanes) for bit in (1, 0))
-        gives_up = b.not_((largest_change < INFINITY).value)
-        for flag in over:
-            gives_up = b.or_(gives_up, b.select(flag, all_of_them, none))
-        failing = b.and_(b.and_(undecided, left.compare(">=", INFINITY)), gives_up)
-        with b.if_then(self.any(failing), likely=False):
-            self.restart(failing)
-
-    def restart(self, failing: Any) -> None:
-        """Begin again without values where that has not been tried, or else let the trajectory leave."""
-        b, form = self.b, self.form
-        if form.varying:  # a shorter step is tried
-            for mask in (self.active, self.alive):
-                b.store(b.and_(b.load(mask), b.not_(failing)), mask)
-            return
-        leaves = b.and_(failing, b.load(self.again))
-        anew = b.and_(failing, b.not_(b.load(self.again)))
-        b.store(b.or_(b.load(self.again), anew), self.again)
-        infinite = self.zero.constant(INFINITY)
-        for variable in (self.last, self.best, self.left):
-            b.store(infinite.where(anew, Value(b, b.load(variable))).value, variable)
-        b.store(self.zero.where(anew, Value(b, b.load(self.stalled))).value, self.stalled)
-        self.each(
-            form.k * form.rows,
-            lambda i: self.put(self.zero.where(anew, self.get(self.values, i)), self.values, i),
-        )
-        b.store(b.and_(b.load(self.active), b.not_(leaves)), self.active)
-        b.store(b.and_(b.load(self.alive), b.not_(leaves)), self.alive)
-
-    def finish(self) -> None:
-        """Set the state at the end, as a sum of two doubles; the displacement is formed first."""
-        from integrators.kernel.step.finish import added, moved_by  # imports numba
-
-        b, form = self.b, self.form
-        ends = [(self.state, self.state), (self.error, self.error)]
-        if form.varying:
-            ahead = [self.array(Group.slots[name]) for name in ("next_state", "next_error")]
-            ends = [(ahead[0], self.state), (ahead[1], self.error)]
-
-        def half(d: Index, high: Any, low: Any, nodes: range) -> Value:
-            total = self.zero
-            for table in (low, high):
-                for j in nodes:
-                    total = self.number(table, j).fma(self.get(self.values, self.at(j, form.rows, d)), total)
-            return total
-
-        def mean(d: Index, high: Any, low: Any) -> tuple[Value, Value]:
-            middle = form.k // 2
-            return half(d, high, low, range(middle)).two_sum(half(d, high, low, range(middle, form.k)))
-
-        def keep(d: Index, new: Value, low: Value) -> None:
-            # The last iterations are not judged: in one component of a lane they may have left no number.
-            good = b.and_(b.load(self.alive), (new - new).compare("==", 0.0))
-            b.store(good, self.alive)
-            for value, base, now in ((new, *ends[0]), (low, *ends[1])):
-                self.put(value.where(good, self.get(now, d)), base, d)
-
-        def row(d: Index) -> None:
-            state, error = self.get(self.state, d), self.get(self.error, d)
-            force = mean(d, self.weights, self.weights_low)
-            if not form.second:
-                keep(d, *added(state, error, self.h, *force))
-                return
-            kh = self.h * self.get(self.velocity, d)
-            drift = self.drift(d, kh)
-            momentum = self.at(1, form.rows, d)
-            p, p_error = self.get(self.state, momentum), self.get(self.error, momentum)
-            kick = mean(d, self.position_weights, self.position_weights_low)
-            keep(d, *moved_by(state, error, *drift, self.h, kh, *kick))
-            keep(momentum, *added(p, p_error, self.h, *force))
-
-        self.each_row(row)
+    return run

@@ -61,7 +61,7 @@ def _checked(way: Any) -> Any:
     def one_half(typing):
         return Half("half")(), lambda context, *_: context.get_dummy_value()
 
-    @way.for_both_widths
+    @way.compiled
     def half(x):
         return x * one_half().value
 
@@ -99,14 +99,6 @@ _way = _chosen()
 
 compiled: Any = _way.compiled
 """Decorate a function of the kernel: numba code that allocates nothing and raises nothing."""
-
-for_both_widths: Any = _way.for_both_widths
-"""Decorate a rule, which is compiled for one number and emitted for a row of them.
-
-It has no branches, and its operations are those of `integrators.kernel.simd.operations`. Called by a
-`compiled` function it is one; called by Python, where the code of lanes is written, it writes
-instructions for `integrators.kernel.simd.values.Value`.
-"""
 
 module: Any = _way.module
 """Compile a `compiled` function; return a module of it and all that it calls, and its name there."""

@@ -132,23 +132,6 @@ def compiled(function: Any, passes: type[CompilerBase] = _Passes) -> Any:
     return _Function(function, locals={}, targetoptions=OPTIONS, pipeline_class=passes)
 
 
-class _Rule(_Function):
-    """A function of numbers in compiled code, and of rows under construction in Python."""
-
-    def __call__(self, *args: Any, **kwargs: Any) -> Any:
-        return self.py_func(*args, **kwargs)
-
-
-def for_both_widths(function: Any) -> Any:
-    """Decorate a rule, which is compiled for one number and emitted for a row of them.
-
-    It has no branches, and its operations are those of `integrators.kernel.simd.operations`. Called by a
-    `compiled` function it is one; called by Python, where the code of lanes is written, it writes
-    instructions for `integrators.kernel.simd.values.Value`.
-    """
-    return _Rule(function, locals={}, targetoptions=OPTIONS, pipeline_class=_Passes)
-
-
 def _jit(*functions: Any, **options: Any) -> Any:
     """Compile numba's own helpers for this target too."""
     return compiled(functions[0], Compiler) if functions else _jit

@@ -10,17 +10,12 @@ from typing import Any
 
 import llvmlite.binding as llvm
 from numba import njit
-from numba.extending import intrinsic, overload_attribute, register_jitable
+from numba.extending import intrinsic, overload_attribute
 
 
 def compiled(function: Any) -> Any:
     """Decorate a function of the kernel; see `integrators.kernel.native.jit`."""
     return njit(error_model="numpy")(function)
-
-
-def for_both_widths(function: Any) -> Any:
-    """Decorate a rule; see `integrators.kernel.native.jit`."""
-    return register_jitable(error_model="numpy")(function)
 
 
 @cache

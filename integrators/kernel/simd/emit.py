@@ -1,6 +1,5 @@
 """LLVM instructions on vectors of doubles, for whoever writes LLVM's text; numba is not needed."""
 
-import re
 from typing import Any
 
 from llvmlite import ir
@@ -78,9 +77,9 @@ class Chains:
 
 def larger_of(builder: Any, x: Any, y: Any) -> Any:
     """Return the larger of non-negative numbers by their bits: a NaN is larger than all and so is kept."""
-    kind = ir.VectorType(INTEGER, WIDTH)
+    kind = ir.VectorType(INTEGER, x.type.count)
     bits = [builder.bitcast(value, kind) for value in (x, y)]
-    return builder.bitcast(llvm_call(builder, "umax", *bits), x.type)
+    return builder.bitcast(llvm_call(builder, "smax", *bits), x.type)
 
 
 def reduced(builder: Any, pick: Any, value: Any) -> Any:
@@ -89,12 +88,3 @@ def reduced(builder: Any, pick: Any, value: Any) -> Any:
         other = builder.shuffle_vector(value, value, indices(*[(i + step) % WIDTH for i in range(WIDTH)]))
         value = pick(builder, value, other)
     return builder.extract_element(value, ir.Constant(ir.IntType(32), 0))
-
-
-def text_of(module: ir.Module) -> str:
-    """Return a module's text; vectors that its functions keep on the stack lie within one line of the cache.
-
-    llvmlite does not write ``attributes.alignstack`` where a function is defined.
-    """
-    aligned = rf'\1 alignstack({ALIGNMENT}) "stackrealign"'
-    return re.sub(r"(?m)^(define [^\n{]*\))$", aligned, str(module))

@@ -40,10 +40,24 @@ class Lanes(types.Type):
         super().__init__(name=f"Lanes({count})")
 
 
+class Mask(types.Type):
+    """In which of K lanes something holds."""
+
+    def __init__(self, count: int):
+        self.count = count
+        super().__init__(name=f"Mask({count})")
+
+
 @register_model(Lanes)
 class _LanesModel(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Any):
         super().__init__(manager, kind, vector(kind.count))
+
+
+@register_model(Mask)
+class _MaskModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, kind: Any):
+        super().__init__(manager, kind, ir.VectorType(ir.IntType(1), kind.count))
 
 
 # --- values in and out of vectors ---------------------------------------------------------------
@@ -192,14 +206,14 @@ def _two_sum(context, builder, sig, args):
     return context.make_tuple(builder, sig.return_type, added(builder, *args))
 
 
-# --- operations of `integrators.kernel.simd.operations`, on numbers ----------------------------------
+# --- operations of `integrators.kernel.simd.operations`, on numbers and on lanes ----------------------
 
 
 def _on_numbers(operation: Any, kinds: list[Any], result: Any, emit: Any) -> None:
     """Give an operation a meaning on numbers."""
 
     def typed(*args: Any) -> Any:
-        return result(*kinds)
+        return None if any(isinstance(kind, Lanes | Mask) for kind in args) else result(*kinds)
 
     typed.__signature__ = signature(operation)  # type: ignore[attr-defined]
     type_callable(operation)(lambda context: typed)
@@ -211,15 +225,89 @@ def _choice(symbol: str) -> Any:
 
 
 def _log(builder: Any, x: Any) -> Any:
-    bits = builder.sitofp(builder.bitcast(x, INTEGER), DOUBLE)
-    scaled = builder.fmul(bits, ir.Constant(DOUBLE, 2.0**-52))
-    return builder.fsub(scaled, ir.Constant(DOUBLE, 1023.0))
+    lanes = isinstance(x.type, ir.VectorType)
+    kind = ir.VectorType(INTEGER, x.type.count) if lanes else INTEGER
+    # Of a number > 0 either is right. AVX2 has neither for lanes, and takes longer for the one with a sign.
+    bits = (builder.uitofp if lanes else builder.sitofp)(builder.bitcast(x, kind), x.type)
+    factor, bias = (
+        ir.Constant(x.type, [number] * x.type.count if lanes else number) for number in (2.0**-52, 1023.0)
+    )
+    return builder.fsub(builder.fmul(bits, factor), bias)
 
 
 _ONE, _TWO = [types.float64], [types.float64] * 2
+for _operation, _kinds, _emit in (
+    (operations.least, _TWO, _choice("<")),
+    (operations.greatest, _TWO, _choice(">")),
+    (operations.size, _ONE, intrinsic_call("fabs")),
+    (operations.binary_log, _ONE, _log),
+):
+    _on_numbers(_operation, _kinds, types.float64, _emit)
+    register(_operation, len(_kinds), Lanes, _emit)
 _on_numbers(operations.where, [types.boolean, *_TWO], types.float64, lambda b, c, x, y: b.select(c, x, y))
 _on_numbers(operations.opposite, [types.boolean], types.boolean, lambda b, c: b.not_(c))
-_on_numbers(operations.least, _TWO, types.float64, _choice("<"))
-_on_numbers(operations.greatest, _TWO, types.float64, _choice(">"))
-_on_numbers(operations.size, _ONE, types.float64, intrinsic_call("fabs"))
-_on_numbers(operations.binary_log, _ONE, types.float64, _log)
+
+for _operator, _symbol in (
+    (operator.lt, "<"),
+    (operator.le, "<="),
+    (operator.gt, ">"),
+    (operator.ge, ">="),
+    (operator.eq, "=="),
+):
+    register(_operator, 2, Mask, lambda b, x, y, symbol=_symbol: b.fcmp_ordered(symbol, x, y))
+
+
+@type_callable(operations.where)
+def _type_where(context):
+    def typed(condition, x, y):
+        if not isinstance(condition, Mask) or _count(x, y) not in (None, condition.count):
+            return None
+        return Lanes(condition.count)(condition, *arguments_for([x, y]))
+
+    return typed
+
+
+@lower_builtin(operations.where, Mask, types.Any, types.Any)
+def _where_mask(context, builder, sig, args):
+    return builder.select(args[0], *spread_to(builder, sig.args[1:], args[1:], sig.args[0].count))
+
+
+@type_callable(operations.opposite)
+def _type_opposite(context):
+    return lambda condition: condition(condition) if isinstance(condition, Mask) else None
+
+
+@lower_builtin(operations.opposite, Mask)
+def _opposite(context, builder, sig, args):
+    return builder.not_(args[0])
+
+
+for _operator, _name in ((operator.and_, "and_"), (operator.or_, "or_")):
+    for _function in (_operator, getattr(operator, f"i{_name}"[:-1])):
+        type_callable(_function)(
+            lambda context: lambda x, y: x(x, y) if isinstance(x, Mask) and x == y else None
+        )
+        lower_builtin(_function, Mask, Mask)(
+            lambda context, builder, sig, args, name=_name: getattr(builder, name)(*args)
+        )
+
+
+@intrinsic
+def everywhere(typing, number, like):
+    """Return a number in as many lanes as ``like`` has."""
+
+    def generate(context, builder, sig, args):
+        return splat(builder, args[0], sig.return_type.count)
+
+    return like(types.float64, like), generate
+
+
+@intrinsic
+def somewhere(typing, mask):
+    """Whether a mask holds in any lane."""
+
+    def generate(context, builder, sig, args):
+        bits = builder.bitcast(args[0], ir.IntType(sig.args[0].count))
+        return builder.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
+
+    return types.boolean(mask), generate

@@ -198,7 +198,7 @@ def larger(typing, x, y):
     def generate(context, builder, sig, args):
         return larger_of(builder, *args)
 
-    return EIGHT(EIGHT, EIGHT), generate
+    return x(x, x), generate
 
 
 def _reduce(pick: Any) -> Any:

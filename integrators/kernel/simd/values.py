@@ -1,35 +1,10 @@
-"""A vector of doubles in LLVM code under construction, with the operators that formulas need."""
+"""A vector of doubles in LLVM code under construction, with the operators that functions of lanes need."""
 
 from typing import Any
 
 from llvmlite import ir
 
 from integrators.kernel.simd.emit import INTEGER, llvm_call, vector
-
-
-class Condition:
-    """Where something holds in a vector under construction."""
-
-    def __init__(self, builder: Any, value: Any):
-        self.builder, self.value = builder, value
-
-    def __and__(self, other: "Condition") -> "Condition":
-        return Condition(self.builder, self.builder.and_(self.value, other.value))
-
-    def __or__(self, other: "Condition") -> "Condition":
-        return Condition(self.builder, self.builder.or_(self.value, other.value))
-
-    def opposite(self) -> "Condition":
-        return Condition(self.builder, self.builder.not_(self.value))
-
-    def choose(self, x: "Value | float", y: "Value | float") -> "Value":
-        """Return x where the condition holds, else y."""
-        kind = vector(self.value.type.count)
-        x, y = (
-            z if isinstance(z, Value) else Value(self.builder, ir.Constant(kind, [float(z)] * kind.count))
-            for z in (x, y)
-        )
-        return x.where(self.value, y)
 
 
 class Value:
@@ -91,10 +66,6 @@ class Value:
             result = result.fma(self, coefficient)
         return result
 
-    def max(self, other: "Value | float") -> "Value":
-        """Return the larger one; of a NaN and a number, any."""
-        return self.where(self.compare(">", other), other)
-
     def where(self, condition: Any, other: "Value | float") -> "Value":
         """Choose the value where the condition holds, else ``other``."""
         return self._make(self.builder.select(condition, self.value, self._operand(other)))
@@ -102,41 +73,14 @@ class Value:
     def compare(self, symbol: str, other: "Value | float") -> Any:
         return self.builder.fcmp_ordered(symbol, self.value, self._operand(other))
 
-    def __lt__(self, other: "Value | float") -> Condition:
-        return Condition(self.builder, self.compare("<", other))
-
-    def __le__(self, other: "Value | float") -> Condition:
-        return Condition(self.builder, self.compare("<=", other))
-
-    def __gt__(self, other: "Value | float") -> Condition:
-        return Condition(self.builder, self.compare(">", other))
-
-    def __ge__(self, other: "Value | float") -> Condition:
-        return Condition(self.builder, self.compare(">=", other))
-
     def integers(self) -> Any:
         return self.builder.bitcast(self.value, ir.VectorType(INTEGER, self.count))
-
-    def bits(self) -> "Value":
-        """Return the bits, read as an integer, as a number."""
-        return self._make(self.builder.uitofp(self.integers(), vector(self.count)))
 
     def whole(self, number: int) -> Any:
         return ir.Constant(ir.VectorType(INTEGER, self.count), [number] * self.count)
 
     def doubles(self, integers: Any) -> "Value":
         return self._make(self.builder.bitcast(integers, vector(self.count)))
-
-    def larger(self, other: "Value") -> "Value":
-        """Return the larger of numbers that are not negative, by their bits: a NaN is larger than all."""
-        bits = llvm_call(self.builder, "smax", self.integers(), other.integers())
-        return self.doubles(bits)
-
-    def two_sum(self, other: "Value") -> "tuple[Value, Value]":
-        """Return the sum, and what rounding took from it (Knuth)."""
-        total = self + other
-        part = total - self
-        return total, (self - (total - part)) + (other - part)
 
     def absolute(self) -> "Value":
         return self._make(llvm_call(self.builder, "fabs", self.value))

@@ -149,11 +149,12 @@ def _shifted(context, builder, sig, args):
 @type_callable(room)
 def _type_room(context):
     def typed(like, n):
-        if not isinstance(n, types.IntegerLiteral):
+        if not isinstance(n, types.Integer):
             return None
         if isinstance(like, Rows):
             return like(like, n)
-        return DOUBLES(like, n) if isinstance(like, Numbers) else None
+        literal = isinstance(n, types.IntegerLiteral)
+        return DOUBLES(like, n) if isinstance(like, Numbers) and literal else None
 
     return typed
 
@@ -209,6 +210,14 @@ def _release(context, builder, sig, args):
         pointer = builder.load(_before(builder, builder.ptrtoint(args[0], INTEGER)))
         builder.call(_of_library(builder, "free", ir.VoidType(), BYTES), [pointer])
     return context.get_dummy_value()
+
+
+@lower_builtin(room, Rows, types.Integer)
+def _room_of_a_form(context, builder, sig, args):
+    """Room of a number of rows that is a constant once the code is linked; not to be used in a loop."""
+    memory = builder.alloca(vector(sig.args[0].count), size=args[1])
+    memory.align = _aligned(sig.args[0].count)
+    return builder.bitcast(memory, DOUBLE.as_pointer())
 
 
 @intrinsic(prefer_literal=True)

@@ -6,7 +6,7 @@ formed; the state is a compensated pair whose error enters the stages.
 """
 
 from integrators.kernel.context import RUNNING
-from integrators.kernel.native.jit import compiled, for_both_widths
+from integrators.kernel.native.jit import compiled
 from integrators.kernel.routes import PER_OCTAVE, THROUGH
 from integrators.kernel.simd.lanes import fma
 from integrators.kernel.simd.memory import get, put, put_lower, put_upper, splat8, spread
@@ -126,13 +126,13 @@ def start_extrapolated(ctx):
     ctx.solver.predicted = 1
 
 
-@for_both_widths
+@compiled
 def on_previous_step(c, first, ratio):
     """Return where ``first + ratio * c`` of another step is in [-1, 1], on which Legendre polynomials are."""
     return 2.0 * (first + ratio * c) - 1.0
 
 
-@for_both_widths
+@compiled
 def next_polynomial(a, b, x, here, before):
     """Return P_{j+1} of P_j and P_{j-1} at x; see `Tables.recurrence`."""
     return fma(a * x, here, -b * before)

@@ -2,7 +2,7 @@
 
 from math import log
 
-from integrators.kernel.native.jit import for_both_widths
+from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.operations import binary_log, greatest, least, opposite, size, where
 
 SAFETY, SHRINK = 0.9, 0.2  # of the length from one step to the next
@@ -28,7 +28,7 @@ INFINITY = float("inf")
 TINY = 1e-300  # an estimated error of 0 counts as this
 
 
-@for_both_widths
+@compiled
 def log_factor(aim, estimate, previous, change):
     """Return the logarithm of the next step's length relative to this one's, from estimated errors.
 
@@ -54,31 +54,31 @@ def log_factor(aim, estimate, previous, change):
     )
 
 
-@for_both_widths
+@compiled
 def is_distinct(h, t):
     """Whether a step of length h from time t can be told from none."""
     return size(h) > SHORTEST * size(t)
 
 
-@for_both_widths
+@compiled
 def is_good(error, allowed, quadrature_error, allowed_quadrature_error):
     """Whether a step is good enough by its estimated errors."""
     return (error <= allowed) & (quadrature_error <= allowed_quadrature_error)
 
 
-@for_both_widths
+@compiled
 def error_power(degree):
     """Return one over the order of the error that is estimated by the coefficient of a degree."""
     return 1.0 / (2.0 * degree + 1.0)
 
 
-@for_both_widths
+@compiled
 def quadrature_error_power(k):
     """Return one over the order of the quadrature's error with k nodes, as it is estimated."""
     return 1.0 / (2.0 * k - 1.0)
 
 
-@for_both_widths
+@compiled
 def log_of_order(error, power):
     """Return the logarithm of an estimated error divided by its order, whose inverse is ``power``.
 
@@ -88,13 +88,13 @@ def log_of_order(error, power):
     return where(error > 0.0, power * (LOG_2 * binary_log(error)), -INFINITY)
 
 
-@for_both_widths
+@compiled
 def log_ratio(x):
     """Return the logarithm of a number near 1: within 6e-4 between 0.83 and 1.2, 0.03 between 0.5 and 2."""
     return 2.0 * (x - 1.0) / (x + 1.0)
 
 
-@for_both_widths
+@compiled
 def as_errors_allow(
     error,
     previous_error,
@@ -143,14 +143,14 @@ def as_errors_allow(
     return factor, (factor < least_factor) & opposite(evident)
 
 
-@for_both_widths
+@compiled
 def room_for_longer(error, error_aim, quadrature_error, quadrature_error_aim, limited):
     """Return the logarithm of how much longer a step might have been for its estimated errors."""
     room = error_aim - error
     return where(limited, least(quadrature_error_aim - quadrature_error, room), room)
 
 
-@for_both_widths
+@compiled
 def bounded(factor, most_growth):
     """Return the factor of a step's length that belongs to a logarithm, within its bounds."""
     root = 1.0 + 0.125 * factor  # exp(factor) is its eighth power: within 1 % for lengths up to 1.4 times
@@ -159,7 +159,7 @@ def bounded(factor, most_growth):
     return where(factor > LOG_SHRINK, longer, SHRINK)  # a NaN too
 
 
-@for_both_widths
+@compiled
 def as_iterations_allow(factor, target, iterations, length, limit):
     """Return the factor of a step's length that is good enough, made smaller for the sake of the iteration.
 

@@ -1,7 +1,7 @@
 """Discontinuities of the field and of its derivatives: steps over them are cut until they do not matter."""
 
 from integrators.kernel.context import UNSOLVED
-from integrators.kernel.native.jit import compiled, for_both_widths
+from integrators.kernel.native.jit import compiled
 from integrators.kernel.parts.discontinuities import EXTRAPOLATED, MOST_RECORDED, NOTHING, SEEN, START
 from integrators.kernel.parts.estimate import AT_START
 from integrators.kernel.parts.surfaces import AT_ORIGIN
@@ -97,7 +97,7 @@ def is_near_discontinuity(ctx, h):
     return ctx.discontinuities.count > 0 or (ctx.t0 - ctx.discontinuities.doubt_end) * h < 0.0
 
 
-@for_both_widths
+@compiled
 def gap_allowed(negligible, outermost, h, previous_length):
     """Return how far the polynomials of two steps may be apart where they meet, beside the size of a block.
 

@@ -2,7 +2,7 @@
 
 from math import log
 
-from integrators.kernel.native.jit import compiled, for_both_widths
+from integrators.kernel.native.jit import compiled
 from integrators.kernel.parts.estimate import (
     AFTER_MIDDLE,
     AT_END,
@@ -53,7 +53,7 @@ DECAYED = 2.0**-6  # part of the size it had that a block has then
 EQUAL_VALUES = 1e-14
 
 
-@for_both_widths
+@compiled
 def is_gap(apart, last, previous_last):
     """Whether the polynomials of two steps are farther apart where they meet than for a smooth field.
 
@@ -107,31 +107,31 @@ def does_not_decay(ctx, d, last):
     return last > ctx.discontinuities.slowest_decay * middle
 
 
-@for_both_widths
+@compiled
 def lowest(gamma_1, gamma_2, gamma_3):
     """Return the largest of the coefficients of a row that a step resolves first, but for its mean."""
     return greatest(greatest(gamma_1, gamma_2), gamma_3)
 
 
-@for_both_widths
+@compiled
 def is_doubtful(low, high, doubt):
     """Whether the last coefficients of a row do not fall off well enough beside the low ones."""
     return high > doubt * low
 
 
-@for_both_widths
+@compiled
 def changes(low, high, gamma_0):
     """Whether a row of the field has not the same value at all nodes."""
     return greatest(low, high) > EQUAL_VALUES * gamma_0
 
 
-@for_both_widths
+@compiled
 def next_coefficient(here, before, decay):
     """Return a coefficient, or what the one before, of the other parity, tells of it where that is more."""
     return greatest(here, decay * before)
 
 
-@for_both_widths
+@compiled
 def judged(
     gamma_0,
     gamma_1,
@@ -161,13 +161,13 @@ def judged(
     return low, high, greatest(gamma_0, low), error, quadrature_error
 
 
-@for_both_widths
+@compiled
 def floored_slope(slope, steepest, part):
     """Return what the field of a block counts as, at least a part of the steepest in its group."""
     return greatest(slope, part * steepest)
 
 
-@for_both_widths
+@compiled
 def size_in_step(scale, largest):
     """Return the size of a block in the step that is estimated, unless that is next to nothing.
 
@@ -179,7 +179,7 @@ def size_in_step(scale, largest):
     return greatest(greatest(scale, LEAST_BLOCK * largest), SMALLEST)
 
 
-@for_both_widths
+@compiled
 def local_error(h, gamma, slope, scale):
     """Return ``h gamma^2 / (slope scale)``, the error of a coefficient that is left out; see `estimate`."""
     error = (gamma * (gamma / slope)) * (h / scale)  # not h / slope, which has no double in a field near 0

@@ -7,7 +7,7 @@ keep the errors of all sums and products makes it a fifth smaller, and steps of 
 """
 
 from integrators.kernel.context import ARRIVE, BY_INCREMENT, DONE, END, NOT_FINITE, UNSOLVED
-from integrators.kernel.native.jit import compiled, for_both_widths
+from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.memory import call_line, get, put, splat8, sums_and_errors, swap, total
 from integrators.kernel.simd.operations import fma, two_sum
 from integrators.kernel.step.projection import project_onto_energy
@@ -63,7 +63,7 @@ def means(ctx, d):
     )  # fmt: skip
 
 
-@for_both_widths
+@compiled
 def added(state, error, h, mean, low):
     """Return the state after an increment of h times a mean + low, and what it lacks.
 
@@ -77,7 +77,7 @@ def added(state, error, h, mean, low):
     return two_sum(moved, error + (low + rounding))
 
 
-@for_both_widths
+@compiled
 def moved_by(state, error, moved, moved_low, h, factor, mean, low):
     """As `added`, of what also drifts, by moved + moved_low, and whose increment has another factor.
 

@@ -9,7 +9,7 @@ evidence of nothing: of no error, of no approach, of no discontinuity.
 
 from math import copysign
 
-from integrators.kernel.native.jit import compiled, for_both_widths
+from integrators.kernel.native.jit import compiled
 from integrators.kernel.parts.estimate import AFTER_MIDDLE, BEFORE_LAST, LAST, MIDDLE
 from integrators.kernel.simd.memory import get, put, splat8, total
 from integrators.kernel.simd.operations import greatest, size, where
@@ -33,19 +33,19 @@ UNIT = 2.0**-52
 GOLDEN = 0.618  # multiples of it, but for their integers, are in no order
 
 
-@for_both_widths
+@compiled
 def beyond_noise(gamma, noise):
     """Return a coefficient of the field, or 0 where noise explains it."""
     return where(gamma > BEYOND_NOISE * noise, gamma, 0.0)
 
 
-@for_both_widths
+@compiled
 def is_visible(h, gamma, scale):
     """Whether a coefficient is more than rounding adds in a step that the fixed-point iteration solves."""
     return h * gamma > STAGNATION * scale
 
 
-@for_both_widths
+@compiled
 def is_evident(h, gamma, largest):
     """Whether a coefficient is more than rounding explains in any field that steps can be solved with.
 

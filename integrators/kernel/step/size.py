@@ -5,7 +5,7 @@ the row itself. Rounding of the field may hide a block that is small beside the 
 its group, so there are two measures, by `Blocks.weights` and by `Blocks.floored_weights`.
 """
 
-from integrators.kernel.native.jit import compiled, for_both_widths
+from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.memory import get, larger, largest, splat8, spread
 from integrators.kernel.simd.operations import greatest, size, where
 from integrators.kernel.step.rule import FLOOR, LARGE, LEAST_BLOCK, SMALLEST
@@ -66,13 +66,13 @@ def enter_size(ctx, d, value):
     blocks.largest[g] = max(blocks.largest[g], value)
 
 
-@for_both_widths
+@compiled
 def inverse(size):
     """Return 1 / size; whatever moves a block of no size is a large change, and then it has a size."""
     return where(size > SMALLEST, 1.0 / size, LARGE)
 
 
-@for_both_widths
+@compiled
 def inverse_sizes(size, largest, least, expected, absolute):
     """Return the inverse of a block's size, by both measures.
 
@@ -91,7 +91,7 @@ def inverse_sizes(size, largest, least, expected, absolute):
     return inverse(own), inverse(greatest(greatest(own, FLOOR * largest), absolute))
 
 
-@for_both_widths
+@compiled
 def speed_of(velocity):
     """Return the velocity by momentum of a block, by size: what its sizes are multiplied by to be compared.
 
@@ -104,11 +104,11 @@ def speed_of(velocity):
     return where(speed > 0.0, speed, 1.0)
 
 
-@for_both_widths
+@compiled
 def least_part(varying):
     """Return the part of the largest block in its group that a block counts as at least.
 
-    Whether steps vary is known where code for lanes is written, and is the same in all lanes.
+    Whether steps vary is the same in all lanes.
     """
     return LEAST_BLOCK if varying else 0.0
 

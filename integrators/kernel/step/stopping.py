@@ -5,7 +5,7 @@
 
 from math import log2
 
-from integrators.kernel.native.jit import compiled, for_both_widths
+from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.operations import binary_log, greatest, least, where
 from integrators.kernel.step.rule import (
     FAST_RATE,
@@ -30,7 +30,7 @@ LOG_RATE_AT_ZERO = log2(0.7)  # to the logarithm of the contraction, where the l
 MOST_TIMES, TRIAL = 3.0, 4.0  # times as many iterations as aimed at are too many, if a trial says so
 
 
-@for_both_widths
+@compiled
 def judge(change, last, best, stalled, rate, tried, tolerance, resolution):
     """Apply the rule to the change of an iteration, which is relative to the size of its block.
 
@@ -99,7 +99,7 @@ def untested_next(untested, tests, stalled, last):
     return max(untested + tests - stalled - (3 if late else 2), 0)
 
 
-@for_both_widths
+@compiled
 def untested(change, rate, log_trusted):
     """Return how many iterations of an adaptive step need no test until its change may be trusted.
 
@@ -111,25 +111,25 @@ def untested(change, rate, log_trusted):
     return least(greatest((log_trusted - change) / rate - 1.0, 0.0), MOST_UNTESTED)
 
 
-@for_both_widths
+@compiled
 def rate_since(first, change, tries):
     """Return the binary logarithm of the contraction over so many iterations, from that of two changes."""
     return least(greatest((change - first) / tries, LEAST_RATE), MOST_RATE)
 
 
-@for_both_widths
+@compiled
 def rate_at_zero(rate):
     """Return what the contraction counts as where nothing is left of the change."""
     return greatest(rate + LOG_RATE_AT_ZERO, LEAST_RATE)
 
 
-@for_both_widths
+@compiled
 def takes_too_long(change, rate, tries, log_residual, target):
     """Whether a shorter step is cheaper than to iterate on, after a trial; ``target``: so many iterations."""
     return (tries >= TRIAL) & (tries + (log_residual - change) / rate > MOST_TIMES * target)
 
 
-@for_both_widths
+@compiled
 def is_rounding(change, repeated, most):
     """Whether rounding accounts for a change that does not decrease; ``repeated``: not for the first time.
 
@@ -140,13 +140,13 @@ def is_rounding(change, repeated, most):
     return change < where(repeated, most, ROUNDING)
 
 
-@for_both_widths
+@compiled
 def stagnates(change, stalled, most):
     """Whether an iteration is over whose changes have ``stalled`` so often, and are of this size now."""
     return (stalled > 0.0) & is_rounding(change, stalled >= STAGNATION_LIMIT, most)
 
 
-@for_both_widths
+@compiled
 def residual_at_end(converged, residual, best):
     """Return what is left of the changes of an iteration that is over, in which the smallest was ``best``.
 
@@ -155,7 +155,7 @@ def residual_at_end(converged, residual, best):
     return where(converged, residual, where(best <= STAGNATION, best, 0.0))
 
 
-@for_both_widths
+@compiled
 def further(change, rate, log_residual):
     """Return how many more evaluations, at the newest stages, leave next to nothing of a change.
 

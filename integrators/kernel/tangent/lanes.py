@@ -8,7 +8,7 @@ trajectory and one for each vector (one for its positions and one for its moment
 
 import numpy as np
 
-from integrators.kernel.ensemble.prepared import STAGES, Lanes, groups_of
+from integrators.kernel.ensemble.prepared import STAGES, Lanes, blocks_of
 from integrators.kernel.native.memory import Numbers
 from integrators.kernel.tables import Constants
 from integrators.kernel.tangent.vectors import OPERATIONS
@@ -51,12 +51,10 @@ class VectorLanes(Lanes):
         self.parameters = system.n_par * (1 + count if moves else 1)
         along = system.tangent("force" if second else "field", count, parameters=moves, beside=True)
         first = own * count
-        groups = tuple(
-            (first + start, blocks, width) for start, blocks, width in groups_of(system, second, own)
-        )
+        blocks = blocks_of(system, second, own) | {"first": first}
         half = own if second or system.dof is None else system.dof
-        vectors = tuple((start, 1, half) for start in range(0, first, half))
-        self._compile(system, constants, along, second, unit, False, groups, vectors)
+        vectors = {"first": 0, "groups": first // half, "count": 1, "width": half}
+        self._compile(system, constants, along, second, unit, False, blocks, vectors)
 
     @staticmethod
     def take(system: System, constants: Constants, count: int) -> bool:

@@ -54,7 +54,7 @@ def test_one_file_imports_private_parts_of_numba():
 
 
 def test_a_numba_that_can_do_nothing_gives_a_sentence(tmp_path):
-    hidden = f"hide({PRIVATE!r}); hide('numba.extending:register_jitable')\n"
+    hidden = f"hide({PRIVATE!r}); hide('numba.extending:overload_attribute')\n"
     done = run(tmp_path, hidden + "from integrators.kernel.native import jit")
     assert done.returncode == 1
     last = done.stderr.strip().splitlines()[-1]

@@ -1,18 +1,13 @@
 """A rule that is written once gives the same bits for one trajectory and in lanes."""
 
 import ctypes
-from typing import Any
 
 import numpy as np
 import pytest
-from llvmlite import ir
 
-from integrators.kernel.native import binary, machine, stages
-from integrators.kernel.native.jit import compiled
+from integrators.kernel.native import binary, stages
 from integrators.kernel.native.memory import aligned
-from integrators.kernel.simd.emit import ALIGNMENT, INTEGER, text_of, vector
 from integrators.kernel.simd.operations import opposite, where
-from integrators.kernel.simd.values import Value
 from integrators.kernel.step.control import as_errors_allow, as_iterations_allow, bounded, log_of_order
 from integrators.kernel.step.estimate import is_gap, judged, local_error, size_in_step
 from integrators.kernel.step.finish import added, moved_by
@@ -80,25 +75,6 @@ def times(t, y, par, out):
     out[3] = speed_of(-y[7])
 
 
-def on_rows(rule):
-    """Return LLVM's text of the rule on rows."""
-    module, kind = ir.Module(), vector(LANES)
-    function = ir.Function(module, ir.FunctionType(ir.VoidType(), [INTEGER] * 4), machine.ENTRY)
-    b = ir.IRBuilder(function.append_basic_block())
-    inputs, outputs = (b.inttoptr(function.args[i], kind.as_pointer()) for i in (1, 3))
-
-    def place(base, i):
-        return b.gep(base, [ir.Constant(INTEGER, i)])
-
-    y = [Value(b, b.load(place(inputs, i), align=ALIGNMENT)) for i in range(ROWS)]
-    out: list[Any] = [None] * 4
-    rule(None, y, None, out)
-    for i, value in enumerate(out):
-        b.store(value.value, place(outputs, i), align=ALIGNMENT)
-    b.ret_void()
-    return text_of(module)
-
-
 def results(code, inputs):
     call = ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 4)(binary.load(code))
     out = []
@@ -110,11 +86,6 @@ def results(code, inputs):
     return np.array(out)
 
 
-@compiled
-def nothing():
-    """Be compiled, for the text that takes its place."""
-
-
 @pytest.mark.parametrize("rule", [stopping, sizes, control, ends, coefficients, times])
 def test_a_rule_gives_the_same_bits_for_a_number_and_for_a_row(rule):
     random = np.random.default_rng(1)
@@ -122,7 +93,7 @@ def test_a_rule_gives_the_same_bits_for_a_number_and_for_a_row(rule):
     chosen = random.uniform(size=inputs.shape)
     inputs[chosen < 0.1] = random.choice([0.0, 1.0, 3.0, np.inf, np.nan], size=(chosen < 0.1).sum())
     alone = results(stages.build_one_by_one(rule, LANES), inputs)
-    in_lanes = results(binary.build(nothing, [], around=lambda inner: on_rows(rule)), inputs)
+    in_lanes = results(stages.build_on_lanes(rule, LANES), inputs)
     assert np.array_equal(alone, in_lanes, equal_nan=True)
     assert np.isfinite(alone).mean() > 0.5
     assert np.unique(alone).size > 1000
