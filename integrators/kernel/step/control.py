@@ -9,9 +9,6 @@ SAFETY, SHRINK = 0.9, 0.2  # of the length from one step to the next
 # Of what would have met the tolerance, after a step whose error was too large (logarithms)
 SHRINK_EXPONENT = 0.7
 TRUST = 0.2  # of a trend to longer steps
-# For a trend, the step before might have been 20 times as long at most (logarithm): estimates below that, in
-# a field near the smallest doubles, vary by any factor.
-FORESEEN = 3.0
 # Part of the way to a longer step, and how much may be missing there: smooth steps are not rejected and start
 # well (logarithms).
 CAUTION, SHORTFALL = 0.5, 0.25
@@ -47,7 +44,7 @@ def log_factor(aim, estimate, previous, change):
         Logarithm of this step's length relative to that of the step before.
     """
     factor = aim - estimate
-    trend = change + greatest(aim - FORESEEN, previous) - estimate
+    trend = change + previous - estimate
     trend = where(size(previous) < INFINITY, where(trend < 0.0, trend, TRUST * trend), 0.0)
     return where(
         factor < 0.0, SHRINK_EXPONENT * factor, greatest(CAUTION * factor, factor - SHORTFALL) + trend
