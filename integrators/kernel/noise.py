@@ -58,8 +58,8 @@ def field_noise(
         0 where rounding of the state and of the derivatives explains what is found, or the field is not
         finite.
     """
-    order = GOLDEN * np.arange(1, len(y) + 1) % 1.0
-    away = np.where(order * 64.0 % 2.0 < 1.0, 0.5, -0.5) * (1.0 + order)  # so that terms do not cancel
+    order = np.asarray(GOLDEN * np.arange(1, len(y) + 1) % 1.0, dtype=np.float64)
+    away: Array = np.where(order * 64.0 % 2.0 < 1.0, 0.5, -0.5) * (1.0 + order)  # so that terms do not cancel
     away *= np.where(y != 0.0, y, h * field(t, y))
     return np.minimum(*(_on_line(field, t, h, y, side * away, lengths) for side in (1.0, -1.0)))
 
