@@ -36,6 +36,7 @@ CONTRACTS_AGAIN = 0.25  # contraction of the fixed-point iteration at which that
 SIZES_SETTLED = 1e-3  # sizes are measured until changes are this small
 # Down to this, a step's coefficients must halve from each to the next after a full Newton iteration
 LEAST_DECAY = 0.02
+LEFT, MOST_DAMPED = 1e-6, 1e8  # part of a size, and of a correction, that a stiff problem may leave
 
 
 @compiled
@@ -144,6 +145,21 @@ def is_scattered(m):
 
 
 @compiled
+def is_left(ctx, m):
+    """Whether the last residual would by itself move a stage by far more than its correction has.
+
+    Corrections are small also where the Jacobian is nearly infinite, as that of ``sqrt(y)`` is at a y that
+    has vanished: with it any extrapolated stages would pass for the solution.
+    """
+    last = m.residual + m.block * (m.parts - 1)
+    left, scale = splat8(0.0), ctx.blocks.floored_weights
+    for d in range(ctx.rows):
+        for group in range(m.groups):
+            left = max(left, abs(get(last, 8 * (m.padded * group + d))) * spread(scale, d))
+    return abs(ctx.h) * largest(left) > max(LEFT, MOST_DAMPED * m.change)
+
+
+@compiled
 def solve_step(ctx, m, started):
     """Solve the step of a context; return the outcome, DONE with the values of the field's polynomial part.
 
@@ -187,6 +203,8 @@ def solve_step(ctx, m, started):
         for i in range(0, m.parts * m.block, 8):
             put(m.gamma, i, get(m.predicted, i) if use else splat8(0.0))
         outcome = iterate(ctx, m, which)
+        if outcome == DONE and (use or m.since) and m.trajectory == 0 and is_left(ctx, m):
+            outcome = DIVERGED
         trying = 0
         if outcome != DONE:
             # First without what may have been bad: the extrapolation, an old Jacobian; then
