@@ -54,13 +54,13 @@ if TYPE_CHECKING:
     from integrators.peers.rebound import Leapfrog as Leapfrog
     from integrators.peers.rebound import WHFast as WHFast
     from integrators.peers.rebound import WHFast512 as WHFast512
+    from integrators.peers.rebound.convert import from_rebound as from_rebound
+    from integrators.peers.rebound.convert import to_rebound as to_rebound
     from integrators.peers.scipy import BDF as BDF
     from integrators.peers.scipy import DOP853 as DOP853
     from integrators.peers.scipy import LSODA as LSODA
     from integrators.peers.scipy import Radau as Radau
     from integrators.peers.sundials import CVODE as CVODE
-    from integrators.plugins.rebound.convert import from_rebound as from_rebound
-    from integrators.plugins.rebound.convert import to_rebound as to_rebound
     from integrators.running.poincare import section as section
 
 __all__ = [
@@ -118,8 +118,8 @@ __all__ = [
 ]
 
 _LATER = {  # imported when first used
-    "from_rebound": "integrators.plugins.rebound.convert",
-    "to_rebound": "integrators.plugins.rebound.convert",
+    "from_rebound": "integrators.peers.rebound.convert",
+    "to_rebound": "integrators.peers.rebound.convert",
     "Event": "integrators.events",
     "advise": "integrators.methods.advice",
     "gradient": "integrators.dynamics",

@@ -5,6 +5,7 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
+from integrators.peers import load
 from integrators.refusals import check_state
 from integrators.solution import Solution
 from problems.bodies import bodies_of, nbody
@@ -135,8 +136,6 @@ def to_rebound(
     >>> to_rebound(problems.load("outer_solar_system")).N
     6
     """
-    from integrators.peers import load
-
     if isinstance(problem, Solution):
         if y is not None or t is not None:
             raise InputError(
