@@ -167,7 +167,7 @@ def methods(count):
 def write(store, texts, count, *, missing=0):
     """Put a run of made-up cases into a store: errors that grow in known ways, some failures."""
     store.prepare()
-    names, rng = methods(count), np.random.default_rng(1)
+    names, rng, here = methods(count), np.random.default_rng(1), machine.describe()
     t = np.linspace(0.0, 100.0, 201)
     ids = []
     for problem in texts:
@@ -188,7 +188,8 @@ def write(store, texts, count, *, missing=0):
             timing = Timing(
                 rounds=[TimingRound(samples=[values["warm_seconds"]], repeats=2, compile=cold)],
                 plan=TimingPlan(rounds=1),
-                machine=machine.describe(),
+                machine=here,
+                process="one",
             )
             made = record(
                 resolved,
