@@ -7,7 +7,7 @@ import tomllib
 import pytest
 
 from hbvm_bench.campaign import file, own
-from hbvm_bench.run import checked, loop
+from hbvm_bench.run import checked, computing, loop
 from problems.errors import InputError
 
 WORDS = {"title", "description", "note", "words", "alone", "name", "lead", "series"}
@@ -105,6 +105,7 @@ def accepted(data, folder):
         made = file.msgspec.convert(data, file.Campaign)
         made = own.opened(made, folder, lambda name: None)
         checked.check(made, loop.plan(made))
+        computing.plan(made, folder)
     except (InputError, file.msgspec.ValidationError):
         return False
     return True
