@@ -10,6 +10,7 @@ import pytest
 import scipy.sparse
 
 from integrators import HBVM, integrate
+from integrators.kernel.native import binary, stages
 from problems import Hamiltonian, InputError, Problem, System, VectorField, targets
 from problems.analysis import invariants
 from problems.graph.loops import affine
@@ -258,15 +259,27 @@ def test_the_code_does_not_grow_with_the_number_of_components():
     assert small.cost == large.cost < 100  # measured 63
 
 
-def test_what_loops_store_in_between_needs_no_stack():
-    n = 80_000  # 16 stages of that are 10 MB, and a stack has 8
+def decays(n):
+    """Return y' = -y by a product that is stored before a loop uses it."""
     minus = -scipy.sparse.eye_array(n, format="csr")
 
-    def decays(y, m):
+    def f(y, m):
         flow = m.dot(minus, y)
         return m.each(lambda i: flow[i], range(n))
 
-    problem = Problem(VectorField(decays, dim=n), y0=np.ones(n), t_end=0.1)
+    return VectorField(f, dim=n)
+
+
+def test_what_loops_store_in_between_lies_on_no_stack_where_it_is_long():
+    text = binary.lower(*stages.on_lanes(targets.numba(decays(1000), "field").py_func, 16))
+    assert "alloca" not in text
+    assert text.count("ptr @malloc(i64 128064)") == text.count("call void @free(") == 1
+
+
+@pytest.mark.slow
+def test_what_loops_store_in_between_needs_no_stack():
+    n = 80_000  # 16 stages of that are 10 MB, and a stack has 8
+    problem = Problem(decays(n), y0=np.ones(n), t_end=0.1)
     solution = integrate(problem, HBVM(k=16, s=8, h=0.1), [0.1])
     assert solution.y[-1] == pytest.approx(np.full(n, np.exp(-0.1)), rel=1e-15)  # measured 1.3e-16
 

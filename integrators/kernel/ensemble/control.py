@@ -15,7 +15,7 @@ from typing import Any
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.lanes import everywhere
 from integrators.kernel.simd.operations import fma, greatest, opposite, size, where
-from integrators.kernel.simd.views import as_rows
+from integrators.kernel.simd.views import as_rows, rows_on_stack
 from integrators.kernel.step.control import (
     APPROACH,
     INFINITY,
@@ -43,7 +43,6 @@ from integrators.kernel.step.rule import SMALLEST
 from integrators.kernel.step.size import speed_of
 from integrators.kernel.step.sums import time_after
 from integrators.kernel.step.vary import LIMITED_GROWTH, MOST_GROWTH
-from problems.targets.called import room
 
 
 def ends_of_steps(lanes: int) -> Any:
@@ -110,7 +109,7 @@ def ends_of_steps(lanes: int) -> Any:
             group.negligible, group.outermost, length, size(as_rows(group.previous_length, lanes)[0])
         )
         rows, count, width = form.rows, form.blocks.count, form.blocks.width
-        parts, sums = room(state, form.k), room(state, form.k)
+        parts, sums = rows_on_stack(state, form.k), rows_on_stack(state, form.k)
         for g in range(form.blocks.groups):
             largest, steepest = zero, zero
             for b in range(count):

@@ -19,7 +19,7 @@ from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.lanes import everywhere, somewhere
 from integrators.kernel.simd.memory import call_field, larger
 from integrators.kernel.simd.operations import fma, greatest, opposite, size, two_sum, where
-from integrators.kernel.simd.views import as_numbers, as_rows
+from integrators.kernel.simd.views import as_numbers, as_rows, rows_on_stack
 from integrators.kernel.step.begin import INFINITY, on_previous_step
 from integrators.kernel.step.finish import added, moved_by
 from integrators.kernel.step.rule import (
@@ -32,7 +32,6 @@ from integrators.kernel.step.rule import (
 from integrators.kernel.step.size import inverse_sizes, least_part
 from integrators.kernel.step.stopping import further, judge, residual_at_end, stagnates
 from integrators.kernel.step.sums import multiplied, part_of_drift, time_of_step
-from problems.targets.called import room
 
 group_at, form_at = view(Group), view(Form)
 
@@ -285,16 +284,16 @@ def steps(lanes: int) -> Any:
         log_residual = LOG_RESIDUAL_VARYING if varying else LOG_RESIDUAL
         state, values = as_rows(group.state, lanes), as_rows(group.values, lanes)
         # Rows are on the stack, in registers if possible, where loops are unrolled.
-        factor = room(state, rows) if unrolled else as_rows(group.factor, lanes)
-        moved = room(state, rows) if unrolled else as_rows(group.moved, lanes)
-        block_weights = room(state, rows) if unrolled else as_rows(group.block_weights, lanes)
-        floored_weights = room(state, rows) if unrolled else as_rows(group.floored_weights, lanes)
-        sizes = room(state, rows) if unrolled else as_rows(group.size, lanes)
-        stage = room(state, rows) if unrolled else as_rows(group.stage, lanes)
-        field_values = room(state, rows) if unrolled else as_rows(group.field_values, lanes)
-        kept = room(state, of_stages) if held else values
-        ahead = room(state, of_stages) if unrolled and not varying else as_rows(group.ahead, lanes)
-        newest, time = room(state, rows) if unrolled else values, room(state, 1)
+        factor = rows_on_stack(state, rows) if unrolled else as_rows(group.factor, lanes)
+        moved = rows_on_stack(state, rows) if unrolled else as_rows(group.moved, lanes)
+        block_weights = rows_on_stack(state, rows) if unrolled else as_rows(group.block_weights, lanes)
+        floored_weights = rows_on_stack(state, rows) if unrolled else as_rows(group.floored_weights, lanes)
+        sizes = rows_on_stack(state, rows) if unrolled else as_rows(group.size, lanes)
+        stage = rows_on_stack(state, rows) if unrolled else as_rows(group.stage, lanes)
+        field_values = rows_on_stack(state, rows) if unrolled else as_rows(group.field_values, lanes)
+        kept = rows_on_stack(state, of_stages) if held else values
+        ahead = rows_on_stack(state, of_stages) if unrolled and not varying else as_rows(group.ahead, lanes)
+        newest, time = rows_on_stack(state, rows) if unrolled else values, rows_on_stack(state, 1)
         h = as_rows(group.h, lanes)[0]
         zero, infinite = everywhere(0.0, h), everywhere(INFINITY, h)
         if held:

@@ -149,12 +149,11 @@ def _shifted(context, builder, sig, args):
 @type_callable(room)
 def _type_room(context):
     def typed(like, n):
-        if not isinstance(n, types.Integer):
+        if not isinstance(n, types.IntegerLiteral):
             return None
         if isinstance(like, Rows):
             return like(like, n)
-        literal = isinstance(n, types.IntegerLiteral)
-        return DOUBLES(like, n) if isinstance(like, Numbers) and literal else None
+        return DOUBLES(like, n) if isinstance(like, Numbers) else None
 
     return typed
 
@@ -212,12 +211,19 @@ def _release(context, builder, sig, args):
     return context.get_dummy_value()
 
 
-@lower_builtin(room, Rows, types.Integer)
-def _room_of_a_form(context, builder, sig, args):
-    """Room of a number of rows that is a constant once the code is linked; not to be used in a loop."""
-    memory = builder.alloca(vector(sig.args[0].count), size=args[1])
-    memory.align = _aligned(sig.args[0].count)
-    return builder.bitcast(memory, DOUBLE.as_pointer())
+@intrinsic
+def rows_on_stack(typing, like, n):
+    """Return room for n rows, a number that is a constant once the code is linked; not to be used in a loop.
+
+    It is no ``room`` of another type of n: numba tries types before literals, and would take it for all.
+    """
+
+    def generate(context, builder, sig, args):
+        memory = builder.alloca(vector(like.count), size=args[1])
+        memory.align = _aligned(like.count)
+        return builder.bitcast(memory, DOUBLE.as_pointer())
+
+    return like(like, types.intp), generate
 
 
 @intrinsic(prefer_literal=True)
