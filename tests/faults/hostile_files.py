@@ -20,6 +20,7 @@ from integrators import HBVM, Gauss, integrate, load
 from integrators.solution import Solution
 from problems import Hamiltonian, InputError, Lagrangian, Poisson, Problem, VectorField, targets
 from problems.systems.base import Bodies, System
+from problems.targets import called
 
 KNOTS, VALUES = [-2.0, -1.0, 0.3, 1.0, 2.0], [0.0, 1.0, -0.5, 0.2, 0.7]
 PAIRS = [(0, 3), (2, 1), (3, 0), (1, 1), (0, 2), (3, 2), (2, 0), (1, 3)]
@@ -125,7 +126,7 @@ class Guarded:
     """An array that refuses every index outside of it, as compiled code does not."""
 
     def __init__(self, values: np.ndarray) -> None:
-        self.values = values
+        self.values, self.shape = values, values.shape
 
     def _inside(self, i: Any) -> Any:
         places = i if isinstance(i, tuple) else (i,)
@@ -154,7 +155,7 @@ def guarded(system: System, what: Any, par: np.ndarray) -> None:
     """Run what would be compiled, with every index checked."""
     for limit in (0, targets.SMALL):
         made = targets.source(system, what, "numba", limit=limit)
-        namespace: dict[str, Any] = {"np": _Numpy, **{name: getattr(math, name) for name in dir(math)}}
+        namespace = {**vars(math), **vars(called), "np": _Numpy, "room": lambda _, n: Guarded(np.empty(n))}
         exec(made.text, namespace)  # noqa: S102 -- the text under test
         n = len(getattr(what, "function", what).outputs)
         with (
