@@ -61,7 +61,7 @@ PARTIAL, STOP, DENSE = range(3)
 UNSOLVED, BY_VALUES, BY_INCREMENT = range(3)
 
 # What the entry of `step` can do; see `integrators.kernel.step.entry`.
-RESET, ADVANCE, TAKE, PART, GO_ON, ACT = range(6)
+RESET, ADVANCE, TAKE, PART, GO_ON, ACT, ATTEMPT = range(7)
 
 # What whole iterations do after the last one, if anything; see `Context.fused`.
 MEASURE, EVALUATE = 1, 2

@@ -9,6 +9,7 @@ import numpy as np
 from integrators.kernel.breakpoints import Breakpoints
 from integrators.kernel.context import (
     ANEW,
+    ATTEMPT,
     BUDGET,
     DENSE,
     DONE,
@@ -19,8 +20,10 @@ from integrators.kernel.context import (
     TAKE,
     UNDERFLOW,
     UNSCALED,
+    UNSOLVED,
     Context,
 )
+from integrators.kernel.engines import steps
 from integrators.kernel.noise import LENGTHS, Noise
 from integrators.kernel.parts.discontinuities import MOST_RECORDED, NOTHING, START
 from integrators.kernel.parts.estimate import TOO_NOISY
@@ -250,7 +253,9 @@ class AdaptiveStepper(HBVMStepper):
         estimate.next_look = LOOK_AGAIN * estimate.troubles
         if not known.values.any():
             estimate.noisy = 0
-            return BUDGET
+            outcome = self._enter(steps.prepared(ATTEMPT, ctx))
+            return self._handled(BUDGET if outcome == DONE else outcome)
+        ctx.solved, ctx.length = UNSOLVED, 0.0
         rows, blocks = slice(-shape.rows, None), ctx.blocks
         estimate.noise[:] = 0.0
         np.maximum.at(estimate.noise, shape.block, known.values[rows] / math.sqrt(ctx.k))

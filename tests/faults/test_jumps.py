@@ -106,6 +106,7 @@ def test_a_jump_in_code_is_found(method, sample):
         solution = integrate(Problem(system, y0=[1.0, 0.0], t_end=END), method, times, sample=sample)
         assert not solution.status.failed
         assert np.abs(solution.y - exact(c, solution.t)).max() < most, c
+        assert (np.diff(solution.t) > 0.0).all(), c  # no step is undone after it was handed out
 
 
 def test_steps_behind_a_jump_are_undone_from_a_checkpoint_too():

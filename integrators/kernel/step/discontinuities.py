@@ -312,6 +312,7 @@ def confirm_previous_step(ctx):
         if differs_behind(ctx):
             undo(ctx)
             return False
+    ctx.discontinuities.undone = 0
     return True
 
 

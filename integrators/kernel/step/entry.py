@@ -1,12 +1,13 @@
 """What Python calls: the one C function of the steps."""
 
-from integrators.kernel.context import ACT, ADVANCE, DONE, GO_ON, PART, RESET
+from integrators.kernel.context import ACT, ADVANCE, ATTEMPT, DONE, GO_ON, PART, RESET
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.views import doubles, integers
 from integrators.kernel.step.act import end_and_change, go_on
 from integrators.kernel.step.anew import reset
 from integrators.kernel.step.loop import advance, context, take_steps
 from integrators.kernel.step.sample import part_step, write
+from integrators.kernel.step.vary import go_on_attempting
 
 
 @compiled
@@ -18,7 +19,7 @@ def entry(operation, ctx, partial, between, count, times, targets, parts, first,
     PART: write the state parts[0] beyond the present one to ``out``, and count nothing; parts[1] is
     the length of the last one from there, or 0. ACT: take the solved step up to an event in it that changes
     the state, and change that. GO_ON: begin at the state that an event has made, with the parameters that are
-    now in memory.
+    now in memory. ATTEMPT: go on with the attempts at the step ahead after NOISY.
     """
     t, n, p, y = doubles(times), integers(targets), doubles(parts), doubles(out)
     if operation == RESET:
@@ -35,4 +36,6 @@ def entry(operation, ctx, partial, between, count, times, targets, parts, first,
         return end_and_change(context(ctx))
     if operation == GO_ON:
         return go_on(context(ctx))
+    if operation == ATTEMPT:
+        return go_on_attempting(context(ctx))
     return take_steps(context(ctx), t, y, budget)

@@ -1,6 +1,6 @@
 """Whole trajectories: steps to the times asked for."""
 
-from integrators.kernel.context import BUDGET, DONE, MISSED, STATE, UNSOLVED, Context
+from integrators.kernel.context import BUDGET, DONE, MISSED, NOISY, STATE, UNSCALED, UNSOLVED, Context
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.step.act import act, end_at_action, step_or_act
@@ -136,18 +136,19 @@ def take_steps(ctx, times, out, budget):
     while True:
         ctx.samples_written = count
         taken = ctx.counters.steps
-        outcome = DONE
         over = remaining(ctx, end) == 0.0 or count == budget > 0
-        if over and confirm_previous_step(ctx):
-            return DONE if remaining(ctx, end) == 0.0 else BUDGET
-        if not over:
-            outcome = solve_adaptive(ctx)
-        if ctx.counters.steps < taken:
+        outcome = DONE if over else solve_adaptive(ctx)
+        # What is handed out before others follow is not undone any more.
+        comes_back = over or (count > 0 and outcome in (BUDGET, NOISY, UNSCALED))
+        confirmed = not comes_back or confirm_previous_step(ctx)
+        if ctx.counters.steps < taken and count > 0:  # else it was no step of these
             count -= 1
             ctx.samples_written = count
-        if outcome != DONE:
+        if confirmed and over:
+            return DONE if remaining(ctx, end) == 0.0 else BUDGET
+        if confirmed and outcome != DONE:
             return outcome
-        if over or (watched(ctx) and not is_smooth_to_end(ctx)):
+        if not confirmed or (watched(ctx) and not is_smooth_to_end(ctx)):
             continue
         outcome = look_first(ctx)
         if outcome != DONE:

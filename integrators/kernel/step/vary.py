@@ -273,7 +273,6 @@ def within(ctx, h):
 @compiled
 def solve_adaptive(ctx):
     """Solve the step ahead with a length that the tolerance allows; `Context.h` is its length."""
-    controller = ctx.controller
     if ctx.solved:
         return DONE
     ctx.events.seen = ctx.events.acting = 0
@@ -284,6 +283,24 @@ def solve_adaptive(ctx):
             return request_solver(ctx)
         switch_to_implicit(ctx)
     begin_attempts(ctx)
+    return attempt_on(ctx)
+
+
+@compiled
+def go_on_attempting(ctx):
+    """As `solve_adaptive` where that has come back with NOISY and it is no noise: as if it had not."""
+    if ctx.solved:
+        return DONE
+    if ctx.discontinuities.undone:
+        undo(ctx)
+        begin_attempts(ctx)
+    return attempt_on(ctx)
+
+
+@compiled
+def attempt_on(ctx):
+    """Attempt the step ahead until it is good enough; the outcome."""
+    controller = ctx.controller
     failure = UNDERFLOW
     while True:
         # Its first stages are on one side only if they are beyond the surface; what follows from the state
@@ -321,11 +338,11 @@ def solve_adaptive(ctx):
         if outcome == NOT_KEPT:
             return outcome
         accepted = accepts(ctx, outcome, ctx.counters.iterations - before, implicit)
-        if may_be_noise(ctx, accepted):
-            ctx.length = 0.0
-            return NOISY
         if accepted:
             ctx.solved = BY_VALUES
+        if may_be_noise(ctx, accepted):
+            return NOISY
+        if accepted:
             return DONE
         if ctx.discontinuities.undone:
             undo(ctx)

@@ -20,7 +20,7 @@ from problems import InputError, Opaque, Problem, VectorField, targets
 
 MU = 5.0
 RAISED = "a function of yours raised ValueError (math domain error)"
-NOISE = 12  # evaluations by adaptive steps for the noise of a field that is called: two lines of k = 6 points
+NOISE = 3 * 34  # evaluations by adaptive steps that look three times for the noise of a field that is called
 METHODS = [
     HBVM(k=6, s=4, h=0.05),
     HBVM(k=6, s=4, tol=1e-9, solver="fixed_point"),
