@@ -38,7 +38,7 @@ def field_noise(
     degrees is noise, of the same size in all of them. As there, the line is longer where most values
     on it are equal, those of a field that is rounded. Coefficients take the place of differences, since those
     of rounded values at equal distances may vanish. The least is taken of two lines that begin at the
-    state in opposite directions: a discontinuity is on one of them.
+    state in opposite directions, at both ends of the step: a discontinuity is on one of them.
 
     Parameters
     ----------
@@ -61,7 +61,8 @@ def field_noise(
     order = np.asarray(GOLDEN * np.arange(1, len(y) + 1) % 1.0, dtype=np.float64)
     away: Array = np.where(order * 64.0 % 2.0 < 1.0, 0.5, -0.5) * (1.0 + order)  # so that terms do not cancel
     away *= np.where(y != 0.0, y, h * field(t, y))
-    return np.minimum(*(_on_line(field, t, h, y, side * away, lengths) for side in (1.0, -1.0)))
+    lines = (t, h, -away), (t + h, -h, away)
+    return np.minimum(*(_on_line(field, start, way, y, beside, lengths) for start, way, beside in lines))
 
 
 def _on_line(
