@@ -68,6 +68,7 @@ def test_a_third_partys_problem_and_integrator_are_found_and_run(installed):
     assert "did you mean 'energy'" in " ".join(rest)
 
 
+@pytest.mark.slow
 def test_the_command_line_knows_a_third_partys_problem_and_integrator(installed, tmp_path):
     program = ["-m", "hbvm_bench.cli"]
     listed = _python([*program, "list", "problems"], installed)

@@ -128,6 +128,7 @@ def test_the_page_of_tasks_says_when_with_what_kernel_and_beside_what_load(monke
 # What takes longest: two references, XLA, many processes, a search for settings of each library.
 SLOW = {"own_campaign.py", "campaign.py", "bodies.py", "fit.py", "radial_velocities.py", "long_runs.py"}
 SLOW |= {"scaling.py", "section.py", "lattice.py", "linkages.py", "star_cluster.py", "encounters.py"}
+SLOW |= {"chaos_map.py", "ensemble.py"}
 SLOW |= {
     "water.py",
     "rattle.py",

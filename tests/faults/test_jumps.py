@@ -109,6 +109,7 @@ def test_a_jump_in_code_is_found(method, sample):
         assert (np.diff(solution.t) > 0.0).all(), c  # no step is undone after it was handed out
 
 
+@pytest.mark.slow
 def test_steps_behind_a_jump_are_undone_from_a_checkpoint_too():
     system, method = SYSTEMS["t**3 > c**3"], METHODS[1]
     for c in np.random.default_rng(4).uniform(0.2, 9.8, 30):

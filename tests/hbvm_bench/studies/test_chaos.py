@@ -111,6 +111,7 @@ def test_maps_tell_regular_from_chaotic_starts():
     assert np.isnan(gone[1])
 
 
+@pytest.mark.slow
 def test_a_quick_run_computes_and_draws_everything(tmp_path, monkeypatch):
     few = {name: SYSTEMS[name] for name in ("thomas", "henon_heiles")}
     for where in (report, report.figures):

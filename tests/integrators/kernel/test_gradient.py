@@ -56,7 +56,8 @@ def stacked(grads, names):
 
 
 @pytest.mark.parametrize(
-    ("count", "k", "s", "steps"), [(4, 3, 3, 2), (4, 6, 3, 2), (400, 4, 3, 3), (400, 3, 3, 3)]
+    ("count", "k", "s", "steps"),
+    [(4, 3, 3, 2), (4, 6, 3, 2)] + [pytest.param(400, k, 3, 3, marks=pytest.mark.slow) for k in (4, 3)],
 )
 def test_they_are_the_differences_of_the_steps_in_36_digits(count, k, s, steps):
     problem, h, rng = PROBLEMS[count](), 0.25, np.random.default_rng(k)

@@ -127,6 +127,7 @@ def test_eight_vectors_are_solved_with_sparse_factors_of_many_matrices():
         solved_by_factors(seed)
 
 
+@pytest.mark.slow
 def test_the_default_factors_one_real_matrix_where_the_jacobian_is_sparse():
     n = 20
     cell = np.arange(n * n).reshape(n, n)

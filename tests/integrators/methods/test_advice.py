@@ -120,6 +120,7 @@ def test_accuracies_that_are_none(accuracy: float) -> None:
         advise(problems.load("kepler"), accuracy)
 
 
+@pytest.mark.slow
 def test_how_far_it_looked_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("integrators.methods.advice.LOOK", 0.0)  # no time for more than 200 steps
     problem = problems.load("pythagorean")  # regular at first; its last encounters part all neighbours

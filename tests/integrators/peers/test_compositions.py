@@ -19,7 +19,13 @@ def driven(q, p, t, m):
 DRIVEN = problems.Problem(problems.Hamiltonian(driven, dof=1), q0=[0.2], p0=[1.0], t_end=8.0)
 
 
-@pytest.mark.parametrize("kind", get_args(Type))
+OFTEN = {"Verlet", "Yo4", "BM4", "ABA864", "RKN6a"}  # each kind compiles for 2 s; all of them are slow tests
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [pytest.param(kind, marks=[] if kind in OFTEN else pytest.mark.slow) for kind in get_args(Type)],
+)
 def test_errors_fall_with_the_order_of_the_type(kind):
     # Measured 1.97 to 2.12, 3.97 to 4.07, 5.94 to 6.27, Yo8 8.8. RKN6a has order 4 if it begins with a kick.
     truth = integrate(PROBLEM, HBVM(), [8.0]).y[-1]

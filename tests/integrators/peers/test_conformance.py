@@ -67,8 +67,8 @@ CASES = [
     (LSODA(rtol=1e-9, atol=1e-11), testing.two_bodies),
     (CVODE(rtol=1e-8, atol=1e-10), testing.pendulum),
     pytest.param(CVODE(rtol=1e-9, atol=1e-11, method="Adams"), testing.two_bodies, marks=SLOW),
-    (Composition(h=0.02), testing.two_bodies),
-    pytest.param(Composition(h=0.05, type="RKN6a"), testing.pendulum, marks=SLOW),
+    pytest.param(Composition(h=0.02), testing.two_bodies, marks=SLOW),
+    (Composition(h=0.05, type="RKN6a"), testing.pendulum),
     (Yoshida4(h=0.02), testing.two_bodies),
     (ImplicitMidpoint(h=0.05), testing.pendulum),
 ]

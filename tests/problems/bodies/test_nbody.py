@@ -158,6 +158,7 @@ def test_relativity_and_a_function_act_together():
     assert _accelerations(bodies, 4) == pytest.approx(wanted, rel=1e-13, abs=1e-14)  # measured 2e-15
 
 
+@pytest.mark.slow
 def test_both_forms_of_relativity_differ_by_the_fourth_power_of_the_velocity_of_light():
     nothing = lambda x: [[0.0, 0.0, 0.0] for _ in x]  # noqa: E731 -- makes it a VectorField
     apart = []
