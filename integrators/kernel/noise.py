@@ -61,7 +61,8 @@ def field_noise(
     order = np.asarray(GOLDEN * np.arange(1, len(y) + 1) % 1.0, dtype=np.float64)
     away: Array = np.where(order * 64.0 % 2.0 < 1.0, 0.5, -0.5) * (1.0 + order)  # so that terms do not cancel
     away *= np.where(y != 0.0, y, h * field(t, y))
-    lines = (t, h, -away), (t + h, -h, away)
+    end = float(np.nextafter(t + h, t))  # whose rounding may be beyond the interval
+    lines = (t, h, -away), (end, -h, away)
     return np.minimum(*(_on_line(field, start, way, y, beside, lengths) for start, way, beside in lines))
 
 
