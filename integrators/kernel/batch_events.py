@@ -19,8 +19,8 @@ from integrators.kernel.context import Context
 from integrators.kernel.engines import look
 from integrators.kernel.ensemble.group import ACCUMULATES, BY_EVENT
 from integrators.kernel.ensemble.prepared import Lanes
-from integrators.kernel.events.functions import Action, EventFunction
-from integrators.kernel.events.search import give_room, room_for, search_memory
+from integrators.kernel.inside.functions import Action, EventFunction
+from integrators.kernel.inside.search import give_room, room_for, search_memory
 from integrators.kernel.pace import FEWEST, Pace
 from integrators.kernel.stepper import CHUNK_WITH_EVENTS, HBVMStepper, accumulated
 from integrators.protocol import Array, Samples, Status

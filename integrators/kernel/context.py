@@ -60,7 +60,7 @@ PARTIAL, STOP, DENSE = range(3)
 # What solves the step ahead, if anything does: the values, or increments that the implicit solver has found.
 UNSOLVED, BY_VALUES, BY_INCREMENT = range(3)
 
-# What the entry of `step` can do; see `integrators.kernel.step.entry`.
+# What the entry of `trajectory` can do; see `integrators.kernel.trajectory.entry`.
 RESET, ADVANCE, TAKE, PART, GO_ON, ACT, ATTEMPT = range(7)
 
 # What whole iterations do after the last one, if anything; see `Context.fused`.

@@ -7,9 +7,9 @@ from integrators.kernel.native.around import Around
 from integrators.kernel.native.engine import Engine
 
 steps = Engine(
-    "step.entry", "entry", "operation ctx partial between count times targets parts first out budget"
+    "trajectory.entry", "entry", "operation ctx partial between count times targets parts first out budget"
 )
-"""``steps(what, ctx, ...)``: see `integrators.kernel.step.entry`."""
+"""``steps(what, ctx, ...)``: see `integrators.kernel.trajectory.entry`."""
 
 iterations = Around("step.fused", "iterations", "context count after")
 """Whole iterations, for forms (lanes, rows, by columns); see `integrators.kernel.step.fused`."""
@@ -27,8 +27,8 @@ triangular = Engine(
 line = Engine("line.entry", "entry", "operation ctx")
 """Line integrals; its address is what the steps call where there is a `Context.line`."""
 
-look = Engine("events.entry", "entry", "ctx search")
-"""``look(ctx, search)``: see `integrators.kernel.events.entry`; the steps call its address too."""
+look = Engine("inside.entry", "entry", "ctx search")
+"""``look(ctx, search)``: see `integrators.kernel.inside.entry`; the steps call its address too."""
 
 follow = Engine("tangent.entry", "entry", "operation ctx memory")
 """``follow(what, ctx, tangents)``: see `integrators.kernel.tangent.entry`; the steps call its address."""

@@ -18,9 +18,9 @@ from integrators.kernel.breakpoints import Breakpoints
 from integrators.kernel.context import Context, Shape, blocks, width_of_blocks
 from integrators.kernel.engines import iterations, look, solver, steps
 from integrators.kernel.ensemble.prepared import Lanes, compiled_lanes, lanes_of
-from integrators.kernel.events.functions import Action, EventFunction
 from integrators.kernel.fixed import FixedStepper
 from integrators.kernel.implicit.workspace import SOLVERS, Workspace, linearization
+from integrators.kernel.inside.functions import Action, EventFunction
 from integrators.kernel.line.kept import Kept
 from integrators.kernel.native import binary, machine
 from integrators.kernel.native import field as fields

@@ -8,9 +8,9 @@ from integrators.events.event import Event
 from integrators.events.finder import EventLog
 from integrators.kernel.context import DONE
 from integrators.kernel.engines import look
-from integrators.kernel.events.functions import Action, EventFunction
-from integrators.kernel.events.memory import START
-from integrators.kernel.events.search import KernelSearch, room_for
+from integrators.kernel.inside.functions import Action, EventFunction
+from integrators.kernel.inside.memory import START
+from integrators.kernel.inside.search import KernelSearch, room_for
 from integrators.kernel.spare import Pair, Searched, Spare
 from integrators.protocol import UserError
 

@@ -32,8 +32,8 @@ from integrators.kernel.context import (
     Context,
 )
 from integrators.kernel.engines import solver, steps
-from integrators.kernel.events.functions import Action, EventFunction
 from integrators.kernel.implicit.workspace import Solver, Workspace, report
+from integrators.kernel.inside.functions import Action, EventFunction
 from integrators.kernel.line.kept import Kept
 from integrators.kernel.native import binary
 from integrators.kernel.native.memory import address

@@ -149,7 +149,7 @@ class AdaptiveStepper(HBVMStepper):
         return ahead * max(ahead * (self._goal - self.t), abs(self._context.controller.next_length)) or ahead
 
     def _is_at(self, t: float, here: float) -> bool:
-        """Whether a time is reached at the present, ``here``; as `integrators.kernel.step.vary.remaining`."""
+        """Whether a time is reached at the present, ``here``; as `kernel.trajectory.vary.remaining`."""
         ctx = self._context
         time_left = (t - here) - ctx.time_low
         return abs(time_left) <= SHORTEST * max(abs(t), abs(here), abs(ctx.controller.previous_length))

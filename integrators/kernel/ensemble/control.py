@@ -12,6 +12,7 @@ bits; lengths are not rounded to ratios with tables, of which lanes have none.
 
 from typing import Any
 
+from integrators.kernel.inside.discontinuities import gap_allowed
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.lanes import everywhere
 from integrators.kernel.simd.operations import fma, greatest, opposite, size, where
@@ -28,7 +29,6 @@ from integrators.kernel.step.control import (
     log_ratio,
     room_for_longer,
 )
-from integrators.kernel.step.discontinuities import gap_allowed
 from integrators.kernel.step.estimate import (
     changes,
     floored_slope,
@@ -42,7 +42,7 @@ from integrators.kernel.step.rounding import is_evident, is_visible
 from integrators.kernel.step.rule import SMALLEST
 from integrators.kernel.step.size import speed_of
 from integrators.kernel.step.sums import time_after
-from integrators.kernel.step.vary import LIMITED_GROWTH, MOST_GROWTH
+from integrators.kernel.trajectory.vary import LIMITED_GROWTH, MOST_GROWTH
 
 
 def ends_of_steps(lanes: int) -> Any:

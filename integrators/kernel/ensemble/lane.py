@@ -2,10 +2,10 @@
 
 from integrators.kernel.context import Context
 from integrators.kernel.ensemble.group import ARRIVED, LEFT
+from integrators.kernel.inside.discontinuities import confirm_previous_step
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
-from integrators.kernel.step.discontinuities import confirm_previous_step
-from integrators.kernel.step.vary import remaining
+from integrators.kernel.trajectory.vary import remaining
 
 context_at = view(Context)
 

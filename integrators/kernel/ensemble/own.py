@@ -3,8 +3,8 @@
 Steps are done on all lanes at once by the code of `integrators.kernel.ensemble.steps`, and most of them
 are judged and followed there too (`integrators.kernel.ensemble.control`). Elsewhere, whether a step is
 good enough and how long the next one is follows as it does for a single trajectory
-(`integrators.kernel.step.vary`): each lane has a `Context` of its own, which catches up then. A step does
-not pass the time of the next sample, but ends there. Events are looked for in
+(`integrators.kernel.trajectory.vary`): each lane has a `Context` of its own, which catches up then. A step
+does not pass the time of the next sample, but ends there. Events are looked for in
 every step (`integrators.kernel.ensemble.watch`).
 """
 
@@ -14,18 +14,18 @@ from integrators.kernel.context import DIVERGED, DONE
 from integrators.kernel.ensemble.group import LEFT, Group
 from integrators.kernel.ensemble.lane import clear, context_at, fetch, state_index, unload, write
 from integrators.kernel.ensemble.watch import has_room, keep_start, look_at_start, watch, watch_ordinary
+from integrators.kernel.inside.discontinuities import is_near_discontinuity, previous_end
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.parts.discontinuities import EXTRAPOLATED
 from integrators.kernel.parts.implicit import FIXED_POINT
 from integrators.kernel.simd.memory import call_steps, put, splat8
-from integrators.kernel.step.anew import reset
 from integrators.kernel.step.begin import INFINITY, can_extrapolate
 from integrators.kernel.step.control import error_power, is_distinct, quadrature_error_power
-from integrators.kernel.step.discontinuities import is_near_discontinuity, previous_end
 from integrators.kernel.step.rule import FIRST_RATE, SMALLEST
 from integrators.kernel.step.size import speed_of
-from integrators.kernel.step.vary import (
+from integrators.kernel.trajectory.anew import reset
+from integrators.kernel.trajectory.vary import (
     LIMITED_STEPS,
     MOST_ATTEMPTS,
     TARGET_ITERATIONS,

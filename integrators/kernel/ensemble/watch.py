@@ -1,28 +1,28 @@
 """Events of trajectories in lanes: they are looked for in one lane after another, as of a single trajectory.
 
 A step that is good enough is shown to the lane's own `Context`, which then has all that the search for events
-(`integrators.kernel.events`) and the actions (`integrators.kernel.step.act`) ask for. Most steps have been
-taken by then (`integrators.kernel.ensemble.control`); where an event ends one, its start is still known. One
-search does for all lanes: what of it lasts from step to step is each lane's own. Where a single trajectory
-would need Python, for the reason of a failure or for more room, the trajectory leaves its lane and goes by
-itself.
+(`integrators.kernel.inside`) and the actions (`integrators.kernel.trajectory.act`) ask for. Most steps have
+been taken by then (`integrators.kernel.ensemble.control`); where an event ends one, its start is still known.
+One search does for all lanes: what of it lasts from step to step is each lane's own. Where a single
+trajectory would need Python, for the reason of a failure or for more room, the trajectory leaves its lane and
+goes by itself.
 """
 
 from integrators.kernel.context import ACCUMULATE, ACT, ACTS, BY_VALUES, DONE, GO_ON, HALTED, RENEW
 from integrators.kernel.ensemble.group import ACCUMULATES, BY_EVENT, LEFT
 from integrators.kernel.ensemble.lane import clear, context_at, fetch, state_index, unload, write, write_until
-from integrators.kernel.events.actions import earlier
-from integrators.kernel.events.memory import START, TERMINAL, WHOLE, Search
-from integrators.kernel.events.value import call_entry
+from integrators.kernel.inside.actions import earlier
+from integrators.kernel.inside.discontinuities import differs_at_an_end
+from integrators.kernel.inside.memory import START, TERMINAL, WHOLE, Search
+from integrators.kernel.inside.value import call_entry
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.parts.discontinuities import EXTRAPOLATED, NOTHING
 from integrators.kernel.simd.memory import call_look, get, put
 from integrators.kernel.step.begin import INFINITY, set_factors
-from integrators.kernel.step.discontinuities import differs_at_an_end
 from integrators.kernel.step.estimate import estimate
 from integrators.kernel.step.rule import FIRST_RATE
-from integrators.kernel.step.vary import begin_attempts
+from integrators.kernel.trajectory.vary import begin_attempts
 
 search_at = view(Search)
 

@@ -4,7 +4,7 @@ from integrators.kernel.native.memory import Integer, Part, Real
 
 
 class Controller(Part):
-    """The lengths of adaptive steps, and what they follow from; see `step.vary` and `step.control`."""
+    """The lengths of adaptive steps, and what they follow from; see `trajectory.vary` and `step.control`."""
 
     allowed_error = Real()  # the estimated local error of a step, relative, at most
     allowed_quadrature_error = Real()  # the same of the quadrature; infinite: any

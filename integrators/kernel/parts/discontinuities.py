@@ -10,7 +10,7 @@ START, NOTHING, EXTRAPOLATED, SEEN = range(-1, 3)
 
 
 class Discontinuities(Part):
-    """Discontinuities of the field and of its derivatives that steps have met; see `step.discontinuities`."""
+    """Jumps of the field and of its derivatives that steps have met; see `inside.discontinuities`."""
 
     doubts = Integer()  # attempts at the step ahead that were rejected and did not look smooth
     doubt = Real()  # last coefficients that are a smaller part of the low ones fall off well enough

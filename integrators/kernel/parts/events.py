@@ -8,7 +8,7 @@ CHANGE, BEGIN_ANEW = 1, 2
 
 
 class Events(Part):
-    """The search for events in each step, and the event that ends it; see `step.act`."""
+    """The search for events in each step, and the event that ends it; see `trajectory.act`."""
 
     code = Pointer()  # int64(context, memory), which looks for events in each step; 0: none
     memory = Pointer()

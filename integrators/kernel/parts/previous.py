@@ -4,7 +4,7 @@ from integrators.kernel.native.memory import Array, Integer, Part, Real
 
 
 class Previous(Part):
-    """The state before the previous step, to go back to; see `step.discontinuities.undo`."""
+    """The state before the previous step, to go back to; see `inside.discontinuities.undo`."""
 
     state = Array(2, "padded")
     error = Array(2, "padded")

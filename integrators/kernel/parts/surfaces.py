@@ -13,7 +13,7 @@ AT_STEP_END, AT_ORIGIN = 1, 2
 
 
 class Surfaces(Part):
-    """Switching surfaces, and the steps that end on them; see `step.surfaces`."""
+    """Switching surfaces, and the steps that end on them; see `inside.surfaces`."""
 
     code = Pointer()  # `problems.analysis.sides`, called like the field; 0: no such surfaces
     count = Integer()  # how many distances it has besides: rows after the first

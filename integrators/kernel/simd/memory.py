@@ -249,12 +249,12 @@ call_solver = _caller(3, types.int64)
 call_line = _caller(2, types.int64)
 """``call_line(line, what, ctx)``: a line integral, see `integrators.kernel.context.Context.line`."""
 call_look = _caller(2, types.int64)
-"""``call_look(look, ctx, memory)``: the search for events, see `integrators.kernel.events`."""
+"""``call_look(look, ctx, memory)``: the search for events, see `integrators.kernel.inside`."""
 call_follow = _caller(3, types.int64)
 """``call_follow(follow, what, ctx, memory)``: vectors along a trajectory, `integrators.kernel.tangent`."""
 call_factors = _caller(2, types.int64)
 """``call_factors(factors, what, which)``: whoever keeps the factors of large matrices."""
 call_entry = _caller(11, types.int64)
-"""``call_entry(entry, operation, ctx, ...)``: steps of a trajectory, see `integrators.kernel.step.entry`."""
+"""``call_entry(entry, operation, ctx, ...)``: see `integrators.kernel.trajectory.entry`."""
 call_steps = _caller(2)
 """``call_steps(code, group, count)``: steps of a group of trajectories, see `integrators.kernel.ensemble`."""

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import integrators
-import integrators.kernel.events.search
+import integrators.kernel.inside.search
 from integrators import HBVM, Event, Gauss, LineIntegral, integrate
 from integrators.kernel.native import foreign
 from integrators.protocol import Status
@@ -209,7 +209,7 @@ def test_what_is_no_function_of_the_user_is_not_said_to_be_one(monkeypatch):
     def wrong(*arguments):
         raise ZeroDivisionError("ours")
 
-    monkeypatch.setattr(integrators.kernel.events.search, "EventLog", wrong)
+    monkeypatch.setattr(integrators.kernel.inside.search, "EventLog", wrong)
     problem = Problem(VectorField(lambda y: [y[1], -y[0]], dim=2), y0=[0.0, 1.0], t_end=9.0)
     with pytest.raises(ZeroDivisionError, match="ours"):
         integrate(problem, HBVM(k=4, s=2, h=0.1), events=lambda y: y[0])

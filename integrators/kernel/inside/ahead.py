@@ -5,7 +5,7 @@ a derivative over a short time; then it is looked at over a longer one.
 """
 
 from integrators.kernel.context import VALUES
-from integrators.kernel.events.sample import function, is_finite, sign
+from integrators.kernel.inside.sample import function, is_finite, sign
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.memory import call_field, call_line
 from integrators.kernel.step.control import SHORTEST

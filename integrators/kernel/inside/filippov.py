@@ -8,10 +8,10 @@ becomes smaller as the surface is approached. Where the field beyond does not ca
 reached the surface, rounding must not decide which field it has: it is put beyond.
 """
 
+from integrators.kernel.inside.discontinuities import previous_end
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.parts.surfaces import AT_STEP_END
 from integrators.kernel.simd.memory import call_field
-from integrators.kernel.step.discontinuities import previous_end
 
 NEAR, FAR = 2.0**-28, 2.0**-20  # of how far states move in a step: distances from the surface
 STAYS = 0.5  # of a speed at the larger distance is left at the smaller one, if it does not vanish

@@ -4,16 +4,16 @@ A step whose nodes are not all on one side is tried again with the length at whi
 surface vanishes, until no node is beyond and the surface is where the step ends: the polynomial of a step
 whose nodes are on one side tells where, a little beyond its end too. The next step begins on the other side.
 Where the fields on both sides push to the surface, the trajectory would slide along it, or stick; see
-`step.filippov`.
+`inside.filippov`.
 """
 
 from integrators.kernel.context import DONE
+from integrators.kernel.inside.discontinuities import previous_end
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.parts.surfaces import AT_ORIGIN, END_ACROSS, MOST_SIDES, NO_SURFACE
 from integrators.kernel.simd.memory import call_field
 from integrators.kernel.step.begin import INFINITY
 from integrators.kernel.step.control import is_distinct
-from integrators.kernel.step.discontinuities import previous_end
 from integrators.kernel.step.sample import interpolate
 
 # What comes of a step that crosses a surface, or was to end on one: judged like all others; tried again with

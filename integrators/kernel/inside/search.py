@@ -11,8 +11,8 @@ from integrators.events.event import Event
 from integrators.events.finder import EventLog
 from integrators.kernel.context import DONE, Context
 from integrators.kernel.engines import look, steps
-from integrators.kernel.events.functions import Action, EventFunction
-from integrators.kernel.events.memory import (
+from integrators.kernel.inside.functions import Action, EventFunction
+from integrators.kernel.inside.memory import (
     FINE,
     FINEST,
     FULL,

@@ -1,14 +1,14 @@
 """What the steps call when a step is solved: the one C function of the search for events."""
 
 from integrators.kernel.context import DONE, HALTED
-from integrators.kernel.events.actions import (
+from integrators.kernel.inside.actions import (
     begin_anew,
     change_state,
     end_step,
 )
-from integrators.kernel.events.ahead import way_ahead
-from integrators.kernel.events.chebyshev import keep_samples, keeps_away, refine, suspect, transform
-from integrators.kernel.events.memory import (
+from integrators.kernel.inside.ahead import way_ahead
+from integrators.kernel.inside.chebyshev import keep_samples, keeps_away, refine, suspect, transform
+from integrators.kernel.inside.memory import (
     FINEST,
     FULL,
     GOING,
@@ -22,7 +22,7 @@ from integrators.kernel.events.memory import (
     WHOLE,
     Search,
 )
-from integrators.kernel.events.sample import (
+from integrators.kernel.inside.sample import (
     NAN,
     function,
     is_finite,
@@ -33,9 +33,9 @@ from integrators.kernel.events.sample import (
     time_at,
     weigh_first,
 )
-from integrators.kernel.events.series import take_series
-from integrators.kernel.events.value import context, forget_states, noise_at, state_at, value_at
-from integrators.kernel.events.zeros import find_zeros
+from integrators.kernel.inside.series import take_series
+from integrators.kernel.inside.value import context, forget_states, noise_at, state_at, value_at
+from integrators.kernel.inside.zeros import find_zeros
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.parts.events import CHANGE

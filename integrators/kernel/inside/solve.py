@@ -1,8 +1,8 @@
 """Where a function changes its sign between two points, and where it is largest."""
 
-from integrators.kernel.events.memory import TINY
-from integrators.kernel.events.sample import is_finite, sign
-from integrators.kernel.events.value import value_at
+from integrators.kernel.inside.memory import TINY
+from integrators.kernel.inside.sample import is_finite, sign
+from integrators.kernel.inside.value import value_at
 from integrators.kernel.native.jit import compiled
 
 BESIDE = 1e-6  # of the stretch: extrema as close to its end are looked for from both sides

@@ -4,10 +4,10 @@ The polynomial of a step is cheap and only of order s + 1. So it says where zero
 states at the ends of partial steps say where they are.
 """
 
-from integrators.kernel.events.chebyshev import near
-from integrators.kernel.events.memory import FINEST, TINY
-from integrators.kernel.events.sample import is_finite, sign
-from integrators.kernel.events.solve import (
+from integrators.kernel.inside.chebyshev import near
+from integrators.kernel.inside.memory import FINEST, TINY
+from integrators.kernel.inside.sample import is_finite, sign
+from integrators.kernel.inside.solve import (
     APART,
     BESIDE,
     EXTREMUM,
@@ -15,7 +15,7 @@ from integrators.kernel.events.solve import (
     is_pole,
     zero_between,
 )
-from integrators.kernel.events.value import noise_at, value_at
+from integrators.kernel.inside.value import noise_at, value_at
 from integrators.kernel.native.jit import compiled
 
 CLEAR_OF_ZERO = 10.0  # an extremum this many times the polynomial's error away from zero does not reach it

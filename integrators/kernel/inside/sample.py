@@ -1,6 +1,6 @@
 """Functions on states: on the polynomial of the step eight at a time, and on one state."""
 
-from integrators.kernel.events.memory import FINE, FINEST, WHOLE
+from integrators.kernel.inside.memory import FINE, FINEST, WHOLE
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.lanes import fma
 from integrators.kernel.simd.memory import call_field, get, put, splat8, spread

@@ -3,13 +3,13 @@
 An adaptive step is solved anew to the first of them; of a fixed step, the partial step up to there, by which
 the event was found, is all that is taken. Its function is 0 there, and the sign that it has next, which
 rounding hides, is that of its slope along the trajectory from the new state: so the same zero is not found
-again. Where the slope is nothing too, the next derivative tells; see `events.ahead`.
+again. Where the slope is nothing too, the next derivative tells; see `inside.ahead`.
 """
 
 from integrators.kernel.context import ACCUMULATE, ACTS, DONE, HALTED, RENEW
-from integrators.kernel.events.ahead import RESTS, way_ahead
-from integrators.kernel.events.memory import GOING, NOTED, RAISED, TERMINAL, TINY, UNDEFINED
-from integrators.kernel.events.sample import NAN, function, is_finite, noise_of, sign, spread_state
+from integrators.kernel.inside.ahead import RESTS, way_ahead
+from integrators.kernel.inside.memory import GOING, NOTED, RAISED, TERMINAL, TINY, UNDEFINED
+from integrators.kernel.inside.sample import NAN, function, is_finite, noise_of, sign, spread_state
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.memory import call_field, put, splat8
 from integrators.kernel.step.control import SHORTEST, is_distinct

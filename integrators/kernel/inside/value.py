@@ -4,8 +4,8 @@ from llvmlite import ir
 from numba import types
 
 from integrators.kernel.context import DONE, PART, Context
-from integrators.kernel.events.memory import CACHED
-from integrators.kernel.events.sample import NAN, function, noise_of, part_at, time_at
+from integrators.kernel.inside.memory import CACHED
+from integrators.kernel.inside.sample import NAN, function, noise_of, part_at, time_at
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.emit import INTEGER
@@ -17,7 +17,7 @@ context = view(Context)
 
 @intrinsic
 def call_entry(typing, steps, operation, own, partial, part, out):
-    """Call the compiled steps; see `integrators.kernel.step.entry`."""
+    """Call the compiled steps; see `integrators.kernel.trajectory.entry`."""
 
     def generate(context, builder, sig, args):
         function, operation, own, partial, part, out = args

@@ -3,11 +3,12 @@
 from integrators.kernel.context import ACT, ADVANCE, ATTEMPT, DONE, GO_ON, PART, RESET
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.views import doubles, integers
-from integrators.kernel.step.act import end_and_change, go_on
-from integrators.kernel.step.anew import reset
-from integrators.kernel.step.loop import advance, context, take_steps
-from integrators.kernel.step.sample import part_step, write
-from integrators.kernel.step.vary import go_on_attempting
+from integrators.kernel.step.sample import write
+from integrators.kernel.trajectory.act import end_and_change, go_on
+from integrators.kernel.trajectory.anew import reset
+from integrators.kernel.trajectory.loop import advance, context, take_steps
+from integrators.kernel.trajectory.part import part_step
+from integrators.kernel.trajectory.vary import go_on_attempting
 
 
 @compiled

@@ -1,6 +1,7 @@
 """The beginning of a trajectory: at its start, and where an event has changed the state."""
 
 from integrators.kernel.context import DONE, UNSOLVED
+from integrators.kernel.inside.surfaces import find_surface
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.parts.discontinuities import NOTHING
 from integrators.kernel.parts.implicit import ALWAYS_IMPLICIT
@@ -12,7 +13,6 @@ from integrators.kernel.step.projection import take_energy
 from integrators.kernel.step.reversible import begin_pace
 from integrators.kernel.step.rule import FIRST_RATE
 from integrators.kernel.step.sample import read, vectors_of_state
-from integrators.kernel.step.surfaces import find_surface
 
 
 @compiled

@@ -70,7 +70,7 @@ class Search(Memory):
     hit_events = Array(kind=int)
     hit_directions = Array(kind=int)
 
-    # --- events that change the state, or end it all, at the end of the step; see `events.actions` ---
+    # --- events that change the state, or end it all, at the end of the step; see `inside.actions` ---
     due = Array("count", kind=int)  # 1: it happens there; `NOTED`: it has, and changes nothing
     due_directions = Array("count", kind=int)
     values_before = Array("count")  # of the functions, before the state is changed

@@ -18,6 +18,10 @@ from integrators.kernel.context import (
     UNSCALED,
     UNSOLVED,
 )
+from integrators.kernel.inside.discontinuities import has_discontinuity, keep_end, record, undo
+from integrators.kernel.inside.filippov import slides
+from integrators.kernel.inside.graze import grazes
+from integrators.kernel.inside.surfaces import AGAIN, REACHED, leave, locate, look_across
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.parts.discontinuities import NOTHING, START
 from integrators.kernel.parts.estimate import TOO_NOISY
@@ -45,17 +49,14 @@ from integrators.kernel.step.control import (
     quadrature_error_power,
     room_for_longer,
 )
-from integrators.kernel.step.discontinuities import has_discontinuity, keep_end, record, undo
 from integrators.kernel.step.estimate import (
     estimate,
     estimate_again,
     estimate_implicit,
     log_decay,
 )
-from integrators.kernel.step.filippov import slides
 from integrators.kernel.step.finish import count_step, finish
 from integrators.kernel.step.fixed_point import iterate_measured
-from integrators.kernel.step.graze import grazes
 from integrators.kernel.step.iterate import end_iteration, extra_iterations, iterate_to_end, test
 from integrators.kernel.step.reversible import keep_pace
 from integrators.kernel.step.rounding import EVIDENT, change_by_noise, largest_added
@@ -74,7 +75,6 @@ from integrators.kernel.step.rule import (
 from integrators.kernel.step.solver_switch import request_solver, solve_implicitly
 from integrators.kernel.step.stopping import rate_at_zero, rate_since, takes_too_long, untested
 from integrators.kernel.step.sums import time_after
-from integrators.kernel.step.surfaces import AGAIN, REACHED, leave, locate, look_across
 
 MOST_GROWTH = FARTHEST  # of the length from one step to the next, at most
 # Iterations to aim at, at most. With contractions (h w)^2 a unit of time costs least at h w = 1/e, which

@@ -1,14 +1,15 @@
 """Whole trajectories: steps to the times asked for."""
 
 from integrators.kernel.context import BUDGET, DONE, MISSED, NOISY, STATE, UNSCALED, UNSOLVED, Context
+from integrators.kernel.inside.discontinuities import confirm_previous_step, is_smooth_to_end
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
-from integrators.kernel.step.act import act, end_at_action, step_or_act
 from integrators.kernel.step.advance import looked, step, watched
-from integrators.kernel.step.discontinuities import confirm_previous_step, is_smooth_to_end
 from integrators.kernel.step.estimate import shorten_first
-from integrators.kernel.step.sample import dimension, followed, sample, write
-from integrators.kernel.step.vary import TIME_TOLERANCE, remaining, solve_adaptive, take
+from integrators.kernel.step.sample import dimension, write
+from integrators.kernel.trajectory.act import act, end_at_action, step_or_act
+from integrators.kernel.trajectory.part import followed, sample
+from integrators.kernel.trajectory.vary import TIME_TOLERANCE, remaining, solve_adaptive, take
 
 context = view(Context)
 

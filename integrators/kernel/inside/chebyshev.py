@@ -1,7 +1,7 @@
 """The polynomial through the samples of a function, as a sum of Chebyshev polynomials."""
 
-from integrators.kernel.events.memory import FINE, FINEST
-from integrators.kernel.events.sample import is_finite, node
+from integrators.kernel.inside.memory import FINE, FINEST
+from integrators.kernel.inside.sample import is_finite, node
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.lanes import fma
 from integrators.kernel.simd.memory import get, largest, put, splat8, spread, total

@@ -6,8 +6,8 @@ back inside. The coefficient gamma_s of the field on that polynomial takes the d
 O(h^(s + 2)). Stages tell it; Gauss methods, whose P_s is 0 at the nodes, evaluate the field at others.
 """
 
-from integrators.kernel.events.memory import NODES
-from integrators.kernel.events.sample import interpolate8, is_finite, weigh
+from integrators.kernel.inside.memory import NODES
+from integrators.kernel.inside.sample import interpolate8, is_finite, weigh
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.memory import call_field, get, put, splat8, total
 from integrators.kernel.step.fixed_point import project

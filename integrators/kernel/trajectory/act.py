@@ -9,12 +9,12 @@ from integrators.kernel.native.jit import compiled
 from integrators.kernel.parts.events import BEGIN_ANEW, CHANGE
 from integrators.kernel.simd.memory import call_look
 from integrators.kernel.step.advance import looked, solve
-from integrators.kernel.step.anew import begin_anew
 from integrators.kernel.step.begin import begin
 from integrators.kernel.step.control import is_distinct
 from integrators.kernel.step.finish import commit, finish
 from integrators.kernel.step.iterate import iterate_to_end
-from integrators.kernel.step.vary import attempt, take
+from integrators.kernel.trajectory.anew import begin_anew
+from integrators.kernel.trajectory.vary import attempt, take
 
 GROWTH_AFTER_ACTION = 1.25  # times that are probably enough to see the next one
 

@@ -1,1 +1,0 @@
-"""Where functions of time and state vanish, found in compiled code step by step."""

@@ -1,0 +1,1 @@
+"""Whole trajectories: the lengths of adaptive steps, what ends a step, and states at the times asked for."""
