@@ -271,7 +271,8 @@ class Graph:
         self._stages: dict[Hashable, Stage] = {}
         self.scopes: list[Loop] = []  # those whose terms are being traced, each with the columns of the last
         self._lifted: dict[tuple[int, int], Node] = {}
-        self.limit: int | None = None  # number of nodes, while a user's function makes them
+        self.limit: int | None = None  # of operations, while a user's function makes them
+        self._written = 0  # operations so far: symbols and constants are none
         self._table: dict[Hashable, Node] = {}
 
     def _intern(
@@ -298,8 +299,9 @@ class Graph:
                     )
                 loop = arg.loop
         node = Node(self, op, args, data, flags, loop)
-        if self.limit is not None and node.id >= self.limit:
-            limits.check(f"{users_line()}: this", "OPERATIONS", node.id + 1, limits.WRITTEN_OUT)
+        self._written += bool(args)
+        if self.limit is not None and self._written > self.limit:
+            limits.check(f"{users_line()}: this", "OPERATIONS", self._written, limits.WRITTEN_OUT)
         self.nodes.append(node)
         self._table[key] = node
         return node
