@@ -68,7 +68,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cache, wraps
-from typing import Any, ClassVar, Protocol, cast, runtime_checkable
+from typing import Any, ClassVar, Literal, Protocol, cast, get_args, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -111,7 +111,8 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-SAMPLINGS = ("partial", "steps", "stop", "dense")
+SamplingName = Literal["partial", "steps", "stop", "dense"]
+SAMPLINGS: tuple[str, ...] = get_args(SamplingName)
 
 
 class Status(StrEnum):

@@ -7,7 +7,7 @@ ignored.
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field
-from typing import Annotated, Any, ClassVar, Literal, Protocol
+from typing import Annotated, Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,8 +48,6 @@ class Reduction(CheckedOptions):
         The axis of the reduction: all trajectories, with one result for each of the m times, or all times,
         with one result for each of the n trajectories.
     """
-
-    _owner: ClassVar[str | None] = "a reduction"
 
     g: Callable[..., Any]
     _: KW_ONLY

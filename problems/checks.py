@@ -25,7 +25,6 @@ from types import MappingProxyType, NoneType, UnionType
 from typing import (
     Annotated,
     Any,
-    ClassVar,
     Literal,
     ParamSpec,
     Self,
@@ -34,7 +33,6 @@ from typing import (
     get_args,
     get_origin,
     get_type_hints,
-    overload,
 )
 
 import numpy as np
@@ -64,7 +62,6 @@ class Must:
 Positive = Annotated[float, Must("a positive number", lambda x: x > 0)]
 """A finite number above 0."""
 
-
 Named = Annotated[
     Mapping[str, T],
     Must(
@@ -74,39 +71,11 @@ Named = Annotated[
 ]
 """A dictionary whose keys are names: ``Named[float]``."""
 
+File = str | os.PathLike[str]
+"""A path of a file, from text or something path-like; returned as a `pathlib.Path`."""
+
 NOTHING: Mapping[str, Any] = MappingProxyType({})
 """The empty one, as a default."""
-
-
-@dataclass(frozen=True)
-class Word:
-    """A name that is looked up later: what is no text is refused as an unknown one of its kind."""
-
-    kind: str
-    known: Sequence[str]
-
-    def checked(self, owner: str, name: str, value: Any) -> str | None:
-        if not isinstance(value, str | None):
-            raise unknown(self.kind, value, self.known)
-        return value
-
-
-class _File:
-    def __repr__(self) -> str:
-        return "a path of a file"
-
-    def checked(self, owner: str, name: str, value: Any) -> Path:
-        try:
-            path = Path(value)
-        except TypeError:
-            path = None
-        if path is None or "\0" in str(path):
-            raise refusal(owner, name, value, "a path of a file, such as 'pendulum.npz'")
-        return path
-
-
-File = Annotated[str | os.PathLike[str], _File()]
-"""A path of a file, from text or something path-like; returned as a `pathlib.Path`."""
 
 
 def at_least(least: int) -> Must:
@@ -125,7 +94,7 @@ def checked(owner: str, name: str, value: Any, annotation: Any) -> Any:
         What was given.
     annotation : any
         What it must be. ``float`` is a finite number, ``int`` a whole one, one of NumPy's
-        too; ``bool``, ``str``, ``Sequence[float]`` or ``Sequence[str]`` (a list, returned as
+        too; ``bool``, ``str``, `File`, ``Sequence[float]`` or ``Sequence[str]`` (a list, returned as
         a tuple), ``Literal[...]`` one of some words or numbers; each may be ``| None``, and
         ``Annotated`` with `Must`, or with an object whose method ``checked(owner, name,
         value)`` takes the place of the type. Any other annotation allows everything.
@@ -135,35 +104,26 @@ def checked(owner: str, name: str, value: Any, annotation: Any) -> Any:
     problems.errors.InputError
         One sentence: the value, and what it must be.
     """
-    if get_origin(annotation) in (Union, UnionType):
-        options = get_args(annotation)
-        if value is None and NoneType in options:
+    if get_origin(annotation) in (Union, UnionType) and NoneType in get_args(annotation):
+        if value is None:
             return None
-        kinds = [option for option in options if option is not NoneType]
-        return checked(owner, name, value, kinds[0]) if len(kinds) == 1 else value
-    if get_origin(annotation) is Literal:
-        return _one_of(owner, name, value, get_args(annotation))
-    kind, *conditions = get_args(annotation) if get_origin(annotation) is Annotated else (annotation,)
+        annotation = Union[tuple(kind for kind in get_args(annotation) if kind is not NoneType)]  # noqa: UP007
+    conditions: list[Any] = []
+    if get_origin(annotation) is Annotated:
+        annotation, *conditions = get_args(annotation)
     for condition in conditions:
         if hasattr(condition, "checked"):
             return condition.checked(owner, name, value)
-    conditions = [condition for condition in conditions if isinstance(condition, Must)]
-    words, read = _KINDS.get(kind, ("", lambda value: value))
-    if kind in (float, int, Sequence[float]) and not isinstance(value, bool):
+    if get_origin(annotation) is Literal:
+        return _one_of(owner, name, value, get_args(annotation))
+    words, read = _KINDS.get(annotation, ("", lambda value: value))
+    if annotation in (float, int, Sequence[float]) and not isinstance(value, bool):
         refuse_more_than_numbers(f"{name}={shown(value)} of {owner}", value)
     result = read(value)
     if (words and result is None) or not all(must.holds(result) for must in conditions):
         # The narrowest condition is the one that is told.
         raise refusal(owner, name, value, conditions[0].be if conditions else words)
     return result
-
-
-def _allows_everything(annotation: Any) -> bool:
-    """Whether `checked` returns any value as it is."""
-    if get_origin(annotation) in (Union, UnionType):
-        kinds = [option for option in get_args(annotation) if option is not NoneType]
-        return len(kinds) > 1 or _allows_everything(kinds[0])
-    return get_origin(annotation) not in (Annotated, Literal) and annotation not in _KINDS
 
 
 def refusal(owner: str, name: str, value: Any, words: str) -> InputError:
@@ -209,11 +169,16 @@ def _texts(value: Any) -> tuple[str, ...] | None:
     return tuple(value) if listed else None
 
 
+def _path(value: Any) -> Path | None:
+    return Path(value) if isinstance(value, str | os.PathLike) and "\0" not in str(value) else None
+
+
 _KINDS: dict[Any, tuple[str, Callable[[Any], Any]]] = {
     float: ("a finite number", number),
     int: ("a whole number", whole),
     bool: ("True or False", _flag),
     str: ("text", _text),
+    File: ("a path of a file, such as 'pendulum.npz'", _path),
     Sequence[float]: ("a list of finite numbers", numbers),
     Sequence[str]: ("a list of texts", _texts),
 }
@@ -237,29 +202,16 @@ class Arguments:
     name : str
         What is called.
     signature : inspect.Signature
-        What it takes; `checked` says which annotations it knows.
+        What it takes; `checked` says which annotations it knows. Defaults are taken as they are.
     kind : str
         What messages call its arguments: ``"option"``.
-    owner : str, optional
-        What a message calls the owner of a wrong value; ``name`` by default.
     """
 
-    def __init__(
-        self, name: str, signature: inspect.Signature, kind: str = "argument", owner: str | None = None
-    ) -> None:
-        self.name, self.kind, self.owner = name, kind, owner or name
-        self.signature = signature
+    def __init__(self, name: str, signature: inspect.Signature, kind: str = "argument") -> None:
+        self.name, self.kind = name, kind
         self.parameters = signature.parameters
-        self._defaults: dict[str, Any] = {}
-        self._by_place = [
-            key for key, parameter in self.parameters.items() if parameter.kind is not parameter.KEYWORD_ONLY
-        ]
-        self._needed = [key for key, parameter in self.parameters.items() if parameter.default is EMPTY]
-        # Values by place, and none by name, that are a call.
-        self._enough = max((1 + [*self.parameters].index(key) for key in self._needed), default=0)
-        self._free = {
-            key for key, parameter in self.parameters.items() if _allows_everything(parameter.annotation)
-        }
+        self._defaults = {key: parameter.default for key, parameter in self.parameters.items()}
+        self._by_place = [key for key, each in self.parameters.items() if each.kind is not each.KEYWORD_ONLY]
 
     def check_names(self, values: Sequence[Any], options: Mapping[str, Any]) -> None:
         """Refuse what the signature does not take.
@@ -277,59 +229,31 @@ class Arguments:
             For values by place that have to be named, one given twice, or one missing.
         """
         name, by_place = self.name, self._by_place
-        if not options and self._enough <= len(values) <= len(by_place):
-            return
         for option in options:
             if option not in self.parameters:
                 raise unknown(f"{self.kind} of {name}", option, self.parameters)
         if len(values) > len(by_place):
-            example = next(
-                key for key in (*self.parameters, "") if key not in by_place and key not in options
-            )
+            free = [key for key in self.parameters if key not in by_place and key not in options]
+            taken = f"only {', '.join(by_place)} by place and the rest" if by_place else f"its {self.kind}s"
             raise InputError(
-                f"{name} takes {self._places()} by name, not {shown(values[len(by_place)])}; "
-                f"write it as in {name}({example}=...)."
+                f"{name} takes {taken} by name, not {shown(values[len(by_place)])}; "
+                f"write it as in {name}({(*free, '')[0]}=...)."
             )
-        placed = by_place[: len(values)]
-        for key in placed:
-            if key in options:
-                raise InputError(f"{name} gets {key} twice, by place and by name; give it once.")
-        missing = [key for key in self._needed if key not in placed and key not in options]
+        given = {*options, *by_place[: len(values)]}
+        if len(given) < len(values) + len(options):
+            twice = next(key for key in by_place if key in options)
+            raise InputError(f"{name} gets {twice} twice, by place and by name; give it once.")
+        missing = [key for key, default in self._defaults.items() if default is EMPTY and key not in given]
         if missing:
             raise InputError(
                 f"{name} needs {', '.join(missing)}; give a value as in {name}({missing[0]}=...)."
             )
 
-    def _places(self) -> str:
-        return (
-            f"only {', '.join(self._by_place)} by place and the rest"
-            if self._by_place
-            else f"its {self.kind}s"
-        )
-
     def value(self, key: str, value: Any) -> Any:
         """Return the value of one argument in the form in which it is used, or refuse it; see `checked`."""
-        parameter = self.parameters[key]
-        if value is not parameter.default:
-            return checked(self.owner, key, value, parameter.annotation)
-        if key not in self._defaults:  # a default is checked once, not in every call
-            self._defaults[key] = checked(self.owner, key, value, parameter.annotation)
-        return self._defaults[key]
-
-    @functools.cached_property
-    def _unchecked(self) -> dict[str, Any]:
-        """The arguments in their order, with the defaults as a call gets them."""
-        return {
-            key: EMPTY if parameter.default is EMPTY else self._used(key, parameter.default)
-            for key, parameter in self.parameters.items()
-        }
-
-    def _used(self, key: str, value: Any) -> Any:
-        if key in self._free:
+        if value is self._defaults[key]:
             return value
-        result = self.value(key, value)
-        # A call prints as it was made: e=0, not e=0.0.
-        return value if type(value) in (int, float) else result
+        return checked(self.name, key, value, self.parameters[key].annotation)
 
     def bind(self, values: Sequence[Any], options: Mapping[str, Any]) -> dict[str, Any]:
         """Return all arguments of a call by name, defaults included, checked.
@@ -340,54 +264,34 @@ class Arguments:
             For a name that is not taken or is missing (`check_names`), or a value that is not allowed.
         """
         self.check_names(values, options)
-        call = self._unchecked.copy()
+        call = self._defaults.copy()
         for key, value in (*zip(self._by_place, values, strict=False), *options.items()):
-            call[key] = value if key in self._free else self._used(key, value)
+            result = self.value(key, value)
+            call[key] = value if type(value) in (int, float) else result  # it prints as it was made: e=0
         return call
 
     def printed(self, values: Mapping[str, Any], first: Iterable[str] = ()) -> dict[str, Any]:
         """Return what a call is printed with: ``first``, then what differs from its default."""
         changed = (
-            key
-            for key, parameter in self.parameters.items()
-            if parameter.default is EMPTY or values[key] != parameter.default
+            key for key, default in self._defaults.items() if default is EMPTY or values[key] != default
         )
         return {key: values[key] for key in (*first, *changed)}
 
 
-@overload
-def checked_arguments(function: Callable[P, R], /) -> Callable[P, R]: ...
-@overload
-def checked_arguments(*, owner: str) -> Callable[[Callable[P, R]], Callable[P, R]]: ...
-def checked_arguments(function: Any = None, /, *, owner: str | None = None) -> Any:
+def checked_arguments(function: Callable[P, R]) -> Callable[P, R]:
     """Make a function, or a written ``__init__``, check its arguments by its signature.
 
-    Parameters
-    ----------
-    function : callable
-        An ``__init__`` is called by the name of its class.
-    owner : str, optional
-        What messages call the owner of a wrong value; the function's name by default.
+    An ``__init__`` is called by the name of its class.
     """
-    if function is None:
-        return functools.partial(_checking, owner=owner)
-    return _checking(function, None)
-
-
-def _checking(function: Callable[P, R], owner: str | None) -> Callable[P, R]:
     signature = inspect.signature(function)
     names = list(signature.parameters)
     bound = int(names[:1] == ["self"])  # a method's own object is no argument of a call
     own = signature.replace(parameters=list(signature.parameters.values())[bound:])
-    makes = function.__name__ == "__init__"
-
-    @functools.cache
-    def arguments(name: str) -> Arguments:
-        return Arguments(name, own, owner=owner)
+    *_, name = function.__qualname__.removesuffix(".__init__").split(".")
+    taken = Arguments(name, own)
 
     @functools.wraps(function)
     def wrapper(*values: P.args, **options: P.kwargs) -> R:
-        taken = arguments(type(values[0]).__name__ if makes else function.__name__)
         return function(*values[:bound], **taken.bind(values[bound:], options))  # type: ignore[call-arg]
 
     return readable(wrapper)
@@ -403,50 +307,44 @@ def _shown(signature: inspect.Signature) -> inspect.Signature:
     """Return a signature with the names of types, and without what must hold of the values."""
     parameters = [
         parameter.replace(
-            annotation=EMPTY if parameter.annotation is EMPTY else _Name(parameter.annotation),
+            annotation=_named(parameter.annotation),
             default={} if parameter.default is NOTHING else parameter.default,
         )
         for parameter in signature.parameters.values()
     ]
-    returned = signature.return_annotation
-    return signature.replace(
-        parameters=parameters, return_annotation=EMPTY if returned is EMPTY else _Name(returned)
-    )
+    return signature.replace(parameters=parameters, return_annotation=_named(signature.return_annotation))
 
 
-class _Name:
-    """A type as ``help`` writes it: ``float | None``, ``Sequence[float]``, ``ArrayLike``."""
+class _Name(str):
+    """A type as ``help`` writes it, without quotes."""
 
-    def __init__(self, annotation: Any) -> None:
-        self._text = _named(annotation)
-
-    def __repr__(self) -> str:
-        return self._text
+    __slots__ = ()
+    __repr__ = str.__str__
 
 
 _ARRAY_LIKE = frozenset(get_args(ArrayLike))
 
 
-def _named(annotation: Any) -> str:
-    if isinstance(annotation, list):  # the arguments of a Callable
-        return f"[{', '.join(map(_named, annotation))}]"
+def _named(annotation: Any) -> Any:
+    """Return the name of a type: ``float | None``, ``Sequence[float]``, ``ArrayLike``."""
     origin, parts = get_origin(annotation), get_args(annotation)
-    if annotation is None or annotation is NoneType:
-        return "None"
+    if annotation is EMPTY:
+        return EMPTY
+    if isinstance(annotation, list):  # the arguments of a Callable
+        return _Name(f"[{', '.join(map(_named, annotation))}]")
     if origin is Annotated:
         return _named(parts[0])
     if origin in (Union, UnionType):
         like = _ARRAY_LIKE.issubset(parts)
-        rest = [part for part in parts if not like or part not in _ARRAY_LIKE]
-        return " | ".join(["ArrayLike"] * like + [_named(part) for part in rest])
+        others = (_named(part) for part in parts if not like or part not in _ARRAY_LIKE)
+        return _Name(" | ".join([*["ArrayLike"] * like, *others]))
     if origin is Literal:
-        return f"Literal[{', '.join(map(repr, parts))}]"
-    if origin is np.ndarray:
-        return "ndarray"
-    if origin is not None:
-        inner = ", ".join("..." if part is ... else _named(part) for part in parts)
-        return f"{origin.__name__}[{inner}]"
-    return annotation if isinstance(annotation, str) else getattr(annotation, "__name__", repr(annotation))
+        return _Name(str(annotation).removeprefix("typing."))
+    if origin is None or origin is np.ndarray:
+        kind = origin or annotation
+        return _Name("None" if kind in (None, NoneType) else getattr(kind, "__name__", kind))
+    inner = ", ".join("..." if part is ... else _named(part) for part in parts)
+    return _Name(f"{origin.__name__}[{inner}]")
 
 
 class _OfFields:
@@ -459,11 +357,9 @@ class _OfFields:
 class CheckedOptions:
     """Base of frozen dataclasses whose options are checked by the annotations of their fields.
 
-    Names are checked before ``__init__`` sees them, values after. ``_owner`` is what messages call
-    the owner of a wrong value; the name of the class by default.
+    Names are checked before ``__init__`` sees them, values after.
     """
 
-    _owner: ClassVar[str | None] = None
     __signature__ = _OfFields()
 
     def __new__(cls, *values: Any, **options: Any) -> Self:
@@ -495,7 +391,5 @@ def _signature(cls: type) -> inspect.Signature:
 def _of_fields(cls: type[CheckedOptions]) -> Arguments:
     """Return what a dataclass takes; annotations that are text are read where they were written."""
     signature, known = _signature(cls), get_type_hints(cls, include_extras=True)
-    taken = [
-        parameter.replace(annotation=known[parameter.name]) for parameter in signature.parameters.values()
-    ]
-    return Arguments(cls.__name__, signature.replace(parameters=taken), "option", cls._owner)
+    taken = [each.replace(annotation=known[each.name]) for each in signature.parameters.values()]
+    return Arguments(cls.__name__, signature.replace(parameters=taken), "option")

@@ -34,7 +34,7 @@ from integrators.options import Count
 from integrators.protocol import Array, MethodBase, Status
 from integrators.running.integrate import SECONDS, NotNegative
 from integrators.running.watch import Report
-from problems.checks import NOTHING, File, Named, Word, at_least, checked_arguments
+from problems.checks import NOTHING, File, Named, at_least, checked_arguments
 from problems.errors import InputError, unknown
 from problems.problem import Problem
 
@@ -153,7 +153,7 @@ class ExponentMap(_Map):
 @checked_arguments
 def indicator_map(
     problem: Problem,
-    indicator: Annotated[str, Word("indicator", tuple(INDICATORS))],
+    indicator: str,
     method: MethodBase | None = None,
     *,
     starts: ArrayLike | None = None,

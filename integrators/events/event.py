@@ -3,7 +3,7 @@
 import operator
 from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, dataclass
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -76,8 +76,6 @@ class Event(CheckedOptions):
     >>> bounce = Event(lambda q: q[0], direction=-1, then=lambda q, p: [q[0], -0.9 * p[0]])
     >>> burnt = Event(lambda t: t - 9.0, then=lambda: (None, {"thrust": 0.0}))
     """
-
-    _owner: ClassVar[str | None] = "an event"
 
     g: Callable[..., Any]
     _: KW_ONLY

@@ -25,6 +25,7 @@ from integrators.protocol import (
     MethodBase,
     Program,
     Samples,
+    SamplingName,
     Samplings,
     Status,
     TimeLimit,
@@ -39,7 +40,7 @@ from integrators.running.watch import SOON, Bar, Report, Watch, both, identity, 
 from integrators.solution.record import Solution, solution_of
 from problems import limits
 from problems.analysis.tables import check_tables
-from problems.checks import File, Must, Word, checked_arguments
+from problems.checks import File, Must, checked_arguments
 from problems.errors import InputError, shown
 from problems.problem import Problem, System
 from problems.quantities import plain_numbers
@@ -61,7 +62,7 @@ def integrate(
     problem: Problem,
     method: MethodBase | None = None,
     times: ArrayLike | None = None,
-    sample: Annotated[str | None, Word("sampling", SAMPLINGS)] = None,
+    sample: SamplingName | None = None,
     events: Event | Callable[..., Any] | Sequence[Event | Callable[..., Any]] = (),
     *,
     variations: Any = None,

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext, suppress
 from pathlib import Path
 from time import perf_counter
-from typing import Annotated, Any, cast
+from typing import Annotated, Any, Literal, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,11 +14,11 @@ from integrators.events.event import Event, named
 from integrators.events.finder import started_with_events
 from integrators.options import Count
 from integrators.protocol import (
-    SAMPLINGS,
     Array,
     MethodBase,
     PieceSize,
     Program,
+    SamplingName,
     Trajectories,
     check_problem,
     offers,
@@ -43,7 +43,7 @@ from integrators.running.variations import directions_of_each
 from integrators.running.watch import SOON, Bar, Progress, Report, Watch, identity, read
 from integrators.solution.ensemble import Solutions
 from problems.analysis.tables import check_tables
-from problems.checks import NOTHING, File, Named, Word, at_least, checked_arguments
+from problems.checks import NOTHING, File, Named, at_least, checked_arguments
 from problems.errors import InputError, shown, unknown
 from problems.problem import Problem
 from problems.quantities import plain_numbers
@@ -67,8 +67,8 @@ def integrate_many(
     threads: Count = 1,
     progress: bool | Report = False,
     events: Event | Callable[..., Any] | Sequence[Event | Callable[..., Any]] = (),
-    backend: Annotated[str | None, Word("backend", ["jax"])] = None,
-    sample: Annotated[str | None, Word("sampling", SAMPLINGS)] = None,
+    backend: Literal["jax"] | None = None,
+    sample: SamplingName | None = None,
     reduce: Named[Reduction] = NOTHING,
     variations: Any = None,
     executor: Any = None,
@@ -330,8 +330,6 @@ def members(who: str, problem: Problem, starts: ArrayLike | None, parameters: An
 def _program(system: System, method: MethodBase, backend: str | None) -> Program:
     if backend is None:
         return method.compile(system)
-    if backend != "jax":
-        raise unknown("backend", backend, ["jax"])
     from integrators.plugins.diffrax.many import JaxProgram  # an optional library, and seconds to import
 
     return cast("Program", JaxProgram(system, method))

@@ -15,7 +15,7 @@ from problems.checks import checked_arguments
 from problems.errors import InputError
 
 
-@checked_arguments(owner="a section")
+@checked_arguments
 def section(
     problem: Problem,
     method: MethodBase,

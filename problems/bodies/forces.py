@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from problems.checks import CheckedOptions, Positive, at_least
+from problems.checks import CheckedOptions, Positive, at_least, refusal
 from problems.errors import InputError, shown
 
 Vector = list[Any]
@@ -81,7 +81,6 @@ class Motion:
 class Force(CheckedOptions):
     """Base of the forces."""
 
-    _owner: ClassVar[str | None] = None
     has_energy: ClassVar[bool] = False
 
     def sources(self) -> Sequence[int]:
@@ -113,7 +112,7 @@ class Harmonics(Force):
         super().__post_init__()
         pole = np.array(self.pole, dtype=np.float64)
         if pole.shape != (3,) or not np.isfinite(pole).all() or not pole.any():
-            raise InputError(f"pole={shown(self.pole)} of {self._owner} must be three numbers, not all 0.")
+            raise refusal(type(self).__name__, "pole", self.pole, "three numbers, not all 0")
         object.__setattr__(self, "pole", tuple(pole.tolist()))
 
     def _coefficients(self) -> Mapping[int, float]:
@@ -173,8 +172,6 @@ class J2(Harmonics):
     J2(J2=0.0010826, R=6378.137, body=0, pole=(0.0, 0.0, 1.0))
     """
 
-    _owner: ClassVar[str | None] = "J2"
-
     J2: float
     R: Positive
     body: Index = 0
@@ -210,8 +207,6 @@ class Zonal(Harmonics):
     >>> Zonal(R=6378.137, J2=1.0826e-3, J3=-2.53e-6).J3
     -2.53e-06
     """
-
-    _owner: ClassVar[str | None] = "Zonal"
 
     R: Positive
     J2: float = 0.0
@@ -268,8 +263,6 @@ class PostNewtonian(Force):
     >>> PostNewtonian(c=63241.077)  # au in a year
     PostNewtonian(c=63241.077, body=None)
     """
-
-    _owner: ClassVar[str | None] = "PostNewtonian"
 
     c: Positive | None = None
     body: Index | None = None
@@ -380,8 +373,6 @@ class RadiationPressure(Force):
     (0.1,)
     """
 
-    _owner: ClassVar[str | None] = "RadiationPressure"
-
     beta: float | Sequence[float]
     bodies: Sequence[Index] | None = None
     source: Index = 0
@@ -448,8 +439,6 @@ class Tides(Force):
     (0.0, 0.0, 0.0)
     """
 
-    _owner: ClassVar[str | None] = "Tides"
-
     k2: float
     R: Positive
     tau: float = 0.0
@@ -508,8 +497,6 @@ class Migration(Force):
     >>> Migration(tau_a=1e5, tau_e=1e3, body=2).primary
     0
     """
-
-    _owner: ClassVar[str | None] = "Migration"
 
     tau_a: float | None = None
     tau_e: float | None = None

@@ -10,7 +10,7 @@ M = e sinh H - H for e > 1. (C. D. Murray, S. F. Dermott, Solar System Dynamics,
 """
 
 from dataclasses import dataclass, fields
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -57,8 +57,6 @@ class Orbit(CheckedOptions):
     >>> Orbit(a=1.524, e=0.0934, M=0.3).e
     0.0934
     """
-
-    _owner: ClassVar[str | None] = "Orbit"
 
     a: ArrayLike
     e: ArrayLike = 0.0

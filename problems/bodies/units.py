@@ -7,7 +7,6 @@ units.
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar
 
 import numpy as np
 
@@ -56,8 +55,6 @@ class Units(CheckedOptions):
     >>> round(units.G, 6), round(units.c, 3)
     (39.476926, 63241.077)
     """
-
-    _owner: ClassVar[str | None] = "Units"
 
     names: str
 

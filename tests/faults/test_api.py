@@ -164,19 +164,19 @@ Event(3)                                                     | an event needs a 
 Event(None)                                                  | an event needs a function g, not None
 Event()                                                      | Event needs g; give a value as in
 Event(osc, 1)                                                | Event takes only g by place and the rest by
-Event(osc, direction=2)                                      | direction=2 of an event must be 1, -1 or 0
-Event(osc, direction='up')                                   | direction='up' of an event must be 1, -1 or 0
-Event(osc, direction=np.array([1, 0]))                       | direction=array([1, 0]) of an event must be
-Event(osc, direction=None)                                   | direction=None of an event must be 1, -1 or 0
-Event(osc, direction=nan)                                    | direction=nan of an event must be 1, -1 or 0
-Event(osc, direction=huge)                                   | direction=about 1e400 of an event must be 1,
-Event(osc, terminal=-1)                                      | terminal=-1 of an event must be True, False,
-Event(osc, terminal='yes')                                   | terminal='yes' of an event must be True,
-Event(osc, terminal=1.5)                                     | terminal=1.5 of an event must be True, False,
-Event(osc, terminal=None)                                    | terminal=None of an event must be True,
-Event(osc, terminal=huge)                                    | terminal=about 1e400 of an event must be
-Event(osc, name=3)                                           | name=3 of an event must be a text
-Event(osc, name='')                                          | name='' of an event must be a text
+Event(osc, direction=2)                                      | direction=2 of Event must be 1, -1 or 0
+Event(osc, direction='up')                                   | direction='up' of Event must be 1, -1 or 0
+Event(osc, direction=np.array([1, 0]))                       | direction=array([1, 0]) of Event must be
+Event(osc, direction=None)                                   | direction=None of Event must be 1, -1 or 0
+Event(osc, direction=nan)                                    | direction=nan of Event must be 1, -1 or 0
+Event(osc, direction=huge)                                   | direction=about 1e400 of Event must be 1,
+Event(osc, terminal=-1)                                      | terminal=-1 of Event must be True, False,
+Event(osc, terminal='yes')                                   | terminal='yes' of Event must be True,
+Event(osc, terminal=1.5)                                     | terminal=1.5 of Event must be True, False,
+Event(osc, terminal=None)                                    | terminal=None of Event must be True,
+Event(osc, terminal=huge)                                    | terminal=about 1e400 of Event must be
+Event(osc, name=3)                                           | name=3 of Event must be a text
+Event(osc, name='')                                          | name='' of Event must be a text
 Event(osc, dirction=1)                                       | unknown option of Event 'dirction'; did you
 integrate(P1, 'HBVM')                                        | method must be a method such as HBVM(k=8,
 integrate('kepler', M1)                                      | problem must be a Problem, not 'kepler'; make
@@ -206,10 +206,10 @@ integrate(P1, M1, method=M1)                                 | integrate gets me
 integrate_many(P1, M1, thread=2)                             | unknown argument of integrate_many 'thread';
 section(P1, M1, osc, cuont=2)                                | unknown argument of section 'cuont'; did you
 integrators.load('a', problme=P1)                               | unknown argument of load 'problme'; did you
-integrate(P1, M1, sample='partail')                          | unknown sampling 'partail'; did you mean
-integrate(P1, M1, sample=3)                                  | unknown sampling 3; known: dense, partial,
-integrate(P1, M1, sample=['partial'])                        | unknown sampling ['partial']; did you mean
-integrate(P1, M1, sample=np.array([1,2]))                    | unknown sampling array([1, 2]); known: dense,
+integrate(P1, M1, sample='partail')                          | unknown sample of integrate 'partail'; did yo
+integrate(P1, M1, sample=3)                                  | unknown sample of integrate 3; known: dense,
+integrate(P1, M1, sample=['partial'])                        | unknown sample of integrate ['partial']; did
+integrate(P1, M1, sample=np.array([1,2]))                    | unknown sample of integrate array([1, 2]); kn
 integrate(P1, M1, events=3)                                  | an event needs a function g, not 3
 integrate(P1, M1, events='q[0]')                             | an event needs a function g, not 'q'
 integrate(P1, M1, events=None)                               | an event needs a function g, not None
@@ -223,17 +223,17 @@ integrate(P1, M1, events=Event)                              | <class 'integrato
 integrate(P1, M1, events=np.sin)                             | <ufunc 'sin'>: event 'sin' asks for an
 integrate(P1, M1, events=osc, sample='stop')                 | events are located on the method's steps,
 section(P1, M1, 3)                                           | an event needs a function g, not 3
-section(P1, M1, osc, direction=3)                            | direction=3 of an event must be 1, -1 or 0
-section(P1, M1, osc, count=0)                                | count=0 of a section must be a whole number of
-section(P1, M1, osc, count='a')                              | count='a' of a section must be a whole number
-section(P1, M1, osc, count=True)                             | count=True of a section must be a whole number
-section(P1, M1, osc, count=1.5)                              | count=1.5 of a section must be a whole number
-section(P1, M1, osc, count=huge)                             | terminal=about 1e400 of an event must be
-section(P1, M1, osc, t_end='a')                              | t_end='a' of a section must be a finite number
-section(P1, M1, osc, t_end=nan)                              | t_end=nan of a section must be a finite number
+section(P1, M1, osc, direction=3)                            | direction=3 of Event must be 1, -1 or 0
+section(P1, M1, osc, count=0)                                | count=0 of section must be a whole number of
+section(P1, M1, osc, count='a')                              | count='a' of section must be a whole number
+section(P1, M1, osc, count=True)                             | count=True of section must be a whole number
+section(P1, M1, osc, count=1.5)                              | count=1.5 of section must be a whole number
+section(P1, M1, osc, count=huge)                             | terminal=about 1e400 of Event must be
+section(P1, M1, osc, t_end='a')                              | t_end='a' of section must be a finite number
+section(P1, M1, osc, t_end=nan)                              | t_end=nan of section must be a finite number
 section(P1, M1, osc, t_end=0.)                               | t_end=0.0 of a section must be another time
-section(P1, M1, osc, t_end=[1, 2])                           | t_end=[1, 2] of a section must be a finite
-section(P1, M1, osc, t_end=huge)                             | t_end=about 1e400 of a section must be a finite
+section(P1, M1, osc, t_end=[1, 2])                           | t_end=[1, 2] of section must be a finite
+section(P1, M1, osc, t_end=huge)                             | t_end=about 1e400 of section must be a finite
 section(P1, 'HBVM', osc)                                     | method must be a method such as HBVM(k=8,
 integrate(F(lambda t, y: [1]), M1)                           | system returns an array of shape (1,), not
 integrate(F(lambda t, y: 'ab'), M1)                          | what system returns must be numbers, not 'ab'

@@ -80,7 +80,9 @@ def test_integrate_says_what_is_wrong_with_its_arguments():
         integrators.integrate("pendulum", method)
     with pytest.raises(InputError, match="method must be a method such as"):
         integrators.integrate(problem, "HBVM")
-    with pytest.raises(UnknownNameError, match=r"unknown sampling 'partail'; did you mean 'partial'"):
+    with pytest.raises(
+        UnknownNameError, match=r"unknown sample of integrate 'partail'; did you mean 'partial'"
+    ):
         integrators.integrate(problem, method, sample="partail")
     with pytest.raises(InputError, match="strictly monotone"):
         integrators.integrate(problem, method, [0.0, 2.0, 1.0])

@@ -444,7 +444,7 @@ def test_what_cannot_be_used_is_refused(events, options, message):
     with pytest.raises(InputError, match=message):
         integrate(oscillator(), WHOLE, events=events, **options)
     for bad in ({"direction": 2}, {"terminal": -1}, {"terminal": 1.0}, {"terminal": "yes"}):
-        with pytest.raises(InputError, match="of an event must be"):
+        with pytest.raises(InputError, match="of Event must be"):
             Event(lambda q: q[0], **bad)
 
 

@@ -55,8 +55,8 @@ def test_a_section_at_a_period_of_time_is_a_stroboscope():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"count": 0}, "count=0 of a section must be a whole number of at least 1"),
-        ({"count": 2.5}, "count=2.5 of a section must be a whole number of at least 1"),
+        ({"count": 0}, "count=0 of section must be a whole number of at least 1"),
+        ({"count": 2.5}, "count=2.5 of section must be a whole number of at least 1"),
         ({"t_end": 0.0}, "another time than t0=0.0"),
         ({"direction": 5}, "direction=5"),
     ],

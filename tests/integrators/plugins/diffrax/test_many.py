@@ -77,5 +77,5 @@ def test_a_field_of_foreign_code_and_an_unknown_backend_are_told():
     problem = Problem(Opaque(lambda t, y: [y[1], -y[0]], dim=2), y0=[1.0, 0.0], t_end=1.0)
     with pytest.raises(InputError, match="not traced"):
         integrate_many(problem, Gauss(s=2, h=0.1), starts=[[1.0, 0.0]], backend="jax")
-    with pytest.raises(InputError, match="unknown backend 'jaxx'"):
+    with pytest.raises(InputError, match="unknown backend of integrate_many 'jaxx'"):
         integrate_many(problem, Gauss(s=2, h=0.1), starts=[[1.0, 0.0]], backend="jaxx")
