@@ -323,18 +323,28 @@ def heyoka_of(system: System, function: Function) -> Any:
     return _for_heyoka(system, _written(function, "function", "heyoka", None))[1][0]
 
 
-def _for_heyoka(system: System, emitted: Source) -> tuple[list[Any], list[Any]]:
-    """Return a system's variables, and a function of them as expressions."""
-    try:
-        import heyoka as hy
-    except ImportError as error:
-        raise _missing("heyoka") from error
+def heyoka_variables(system: System) -> list[Any]:
+    """Return the variables of a system's state as heyoka's expressions, see `heyoka`."""
     width = len(str(system.dim))
     if system.dof is None:
         names = [f"y{i:0{width}d}" for i in range(system.dim)]
     else:
         names = [f"{x}{i:0{width}d}" for x in "qp" for i in range(system.dof)]
-    variables = list(hy.make_vars(*names)) if len(names) > 1 else [hy.make_vars(*names)]
+    made = _heyoka().make_vars(*names)
+    return list(made) if len(names) > 1 else [made]
+
+
+def _heyoka() -> Any:
+    try:
+        import heyoka as hy
+    except ImportError as error:
+        raise _missing("heyoka") from error
+    return hy
+
+
+def _for_heyoka(system: System, emitted: Source) -> tuple[list[Any], list[Any]]:
+    """Return a system's variables, and a function of them as expressions."""
+    hy, variables = _heyoka(), heyoka_variables(system)
     expressions = _executed(emitted, {})(hy.time, variables, hy.par, hy)
     return variables, [e if isinstance(e, hy.expression) else hy.expression(e) for e in expressions]
 

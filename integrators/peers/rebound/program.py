@@ -13,13 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from integrators.peers import load
+from integrators.peers.gravity import check_gravity, masses_and_constant
 from integrators.protocol import Array, MethodBase, Stats
 from integrators.stepping import ProgramBase, StepperBase
 from problems.errors import InputError
 from problems.problem import Problem, System
-
-AGREES = 1e-9
-"""Relative difference up to which REBOUND's gravity is the system's own vector field."""
 
 REBOUND = """\
 @article{ReinLiu2012,
@@ -49,7 +47,7 @@ class ReboundMethod(MethodBase):
     def refuses(self, system: System, par: Array) -> str | None:
         """Return why the method cannot integrate ``system`` with parameters ``par``, or None."""
         if system.bodies is not None:
-            masses = _parameter(system, par, system.bodies.masses)
+            masses, _ = masses_and_constant(system, par)
             if not np.all(masses > 0.0):
                 return "it needs positive masses, since the momentum of a massless body is 0."
         elif not system.separable:
@@ -117,7 +115,7 @@ class ReboundProgram(ProgramBase):
             raise InputError(f"{self.method!r} cannot integrate {self.system.name}: {reason}")
         layout = Layout(self.system, par, self.method)
         if layout.bodies is not None:
-            self._check_gravity(layout, t, y)
+            check_gravity(self.system, par, t, y)
         return self.method.stepper(self, layout, y, t)
 
     def simulation(self, layout: "Layout", t: float, y: Array) -> Any:
@@ -146,22 +144,6 @@ class ReboundProgram(ProgramBase):
         with self.hooks.detached(simulation):
             return simulation.__reduce__()[1][0]
 
-    def _check_gravity(self, layout: "Layout", t: float, y: Array) -> None:
-        from problems import targets
-
-        simulation = self._bodies(layout, t, y)
-        choose(simulation, "leapfrog")
-        simulation.dt = 0.0
-        simulation.steps(1)
-        dof = self.system.dim // 2
-        ours = targets.numpy(self.system, "field")(t, y, layout.par)[dof:]
-        theirs = layout.mass * self.hooks.particles(simulation)[layout.place, 6 : 6 + layout.width].ravel()
-        if not np.allclose(theirs, ours, rtol=0.0, atol=AGREES * float(np.max(np.abs(ours)))):
-            raise InputError(
-                f"{self.system.name} declares bodies, but its forces are not their gravity; "
-                "leave out bodies= to have its own vector field integrated."
-            )
-
 
 class Layout:
     """Where the state of a system lies among REBOUND's particles, for one set of parameters.
@@ -186,9 +168,7 @@ class Layout:
         if self.bodies is not None:
             self.width = self.bodies.dimension
             self.n = dof // self.width
-            masses = _parameter(system, par, self.bodies.masses)
-            G = self.bodies.G
-            self.G = float(_parameter(system, par, G)[0] if isinstance(G, str) else G)
+            masses, self.G = masses_and_constant(system, par)
             order = method.order_of_bodies(self.n)
             self.masses = masses[order]
             self.place = np.argsort(order)
@@ -245,14 +225,3 @@ def calls(stats: Stats) -> Iterator[None]:
         messages = stats.extra.setdefault("messages", [])
         if str(warning.message) not in messages:
             messages.append(str(warning.message))
-
-
-def _parameter(system: System, par: Array, name: str) -> Array:
-    """Return the values of one parameter."""
-    offset = 0
-    for key, value in system.parameters.items():
-        size = len(value) if isinstance(value, tuple) else 1
-        if key == name:
-            return par[offset : offset + size]
-        offset += size
-    raise InputError(f"{system.name} has no parameter {name!r}, which its bodies refer to.")

@@ -207,3 +207,42 @@ def test_a_motion_too_fast_for_the_unit_of_time_is_told_so():
     assert re.search(
         r"order (19|20) of 20 leave the range of doubles.* unit of time.* shorter one\.", solution.reason
     )
+
+
+def test_its_own_model_of_bodies_moves_them_as_the_formula_does() -> None:
+    problem = problems.load("outer_solar_system", t_end=100.0)
+    formula, own = (
+        integrate(problem, Taylor(compact_mode=True, nbody=nbody), times=[0.0, 50.0, 100.0])
+        for nbody in (False, True)
+    )
+    assert np.abs(own.y - formula.y).max() < 1e-12  # 3e-13
+    assert not np.array_equal(own.y, formula.y)
+    assert own.errors()["energy"].max() < 1e-14  # 7e-16
+
+
+def test_its_own_model_has_the_masses_of_the_problem_and_finds_events() -> None:
+    light = problems.load("outer_solar_system", t_end=20.0)
+    heavy = light.replace(parameters={"m": [2.0, *light.system.parameters["m"][1:]]})
+    program = Taylor(compact_mode=True, nbody=True).compile(light.system)
+    ends = [
+        program.start(p.y0, p.par).advance([20.0]).y[-1]  # the second has other masses compiled in
+        for p in (light, heavy, light)
+    ]
+    assert np.abs(ends[1] - integrate(heavy, Taylor(compact_mode=True)).y[-1]).max() < 1e-12
+    assert np.array_equal(ends[0], ends[2])
+    crossing = Event(lambda q: q[4], name="node")
+    found = [
+        integrate(heavy, Taylor(compact_mode=True, nbody=nbody), events=crossing).events["node"].t
+        for nbody in (False, True)
+    ]
+    assert found[0].size > 0
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-12)
+
+
+def test_its_own_model_is_for_bodies_alone() -> None:
+    with pytest.raises(InputError, match=r"nbody=True is for bodies in space.*leave it out"):
+        integrate(problems.load("kepler", t_end=1.0), Taylor(nbody=True))
+    problem = problems.load("outer_solar_system", t_end=1.0)
+    program = Taylor(compact_mode=True, nbody=True).compile(problem.system)
+    with pytest.raises(InputError, match=r"nbody=True has no ensembles"):
+        program.batch([problem.y0], times=[1.0])
