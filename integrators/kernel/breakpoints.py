@@ -34,10 +34,15 @@ class Breakpoints:
         self._all = given  # with the switches that are known
         self._low, self._high = (math.nan, math.nan) if some else (-math.inf, math.inf)
         self._span, self._longest = 0.0, math.inf
+        self._resolutions: dict[float, float] = {}
 
     def moved_by(self, par: Array) -> bool:
         """Whether other parameters move them."""
         return self._switches.any and self._switches.moved(self._par, par)
+
+    def resolution(self, t: float) -> float:
+        """Return how far from a breakpoint rounding may have the field switch, as far as that is known."""
+        return self._resolutions.get(t, 0.0)
 
     def around(self, t: float, span: float) -> list[float]:
         """Return the breakpoints next to a time.
@@ -87,13 +92,17 @@ class Breakpoints:
         span = min(self._span, self._longest, rest)
         overlap = OVERLAP * max(span, abs(edge))
         ends = edge - sign * overlap, edge + sign * (span + overlap)
-        times, near, far = self._switches.times(self._par, *ends)
+        times, resolutions, near, far = self._switches.times(self._par, *ends)
         if math.isinf(far):
             self._points, self._low, self._high = times, -math.inf, math.inf
             self._all = np.union1d(self._given, times)
             return
         here = np.abs(times - t) <= RESOLUTION * max(abs(near), abs(far))
         kept = self._points[(self._points - t) * sign >= 0.0]
+        ahead = {time: at for time, at in self._resolutions.items() if (time - t) * sign >= 0.0}
+        self._resolutions = ahead | resolutions
+        for time in times[here].tolist():
+            self._resolutions[t] = max(self.resolution(t), self.resolution(time))
         self._points = np.union1d(kept, np.where(here, t, times))
         self._all = np.union1d(self._given, self._points)
         self._low, self._high = (t, far) if sign > 0.0 else (far, t)

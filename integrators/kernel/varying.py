@@ -80,8 +80,14 @@ class AdaptiveStepper(HBVMStepper):
     def _begin_at_breakpoint(self) -> None:
         """Let the step ahead begin with the values beyond a breakpoint, if one is here."""
         here = self.t
-        if any(self._is_at(point, here) for point in self._breakpoints.around(here, self._expected_way())):
-            self._context.discontinuities.boundary = START
+        for point in self._breakpoints.around(here, self._expected_way()):
+            if self._is_at(point, here):
+                self._begin_beyond(point)
+
+    def _begin_beyond(self, point: float) -> None:
+        """Let the step ahead begin where the field may jump."""
+        discontinuities = self._context.discontinuities
+        discontinuities.boundary, discontinuities.resolution = START, self._breakpoints.resolution(point)
 
     def _extra(self) -> dict[str, Any]:
         c, context = self._program.constants, self._context
@@ -141,6 +147,7 @@ class AdaptiveStepper(HBVMStepper):
             controller.stop, controller.breaks = end, 0
         else:
             controller.stop, controller.breaks = stop, int(breaks)
+            controller.resolution = points.resolution(stop)
         return stop
 
     def _expected_way(self) -> float:
@@ -169,7 +176,7 @@ class AdaptiveStepper(HBVMStepper):
         length = ctx.controller.next_length
         ctx.controller.next_length = math.copysign(max(abs(length), RESTART * abs(t)), length)
         ctx.solved = ctx.blocks.age = 0
-        ctx.discontinuities.boundary = START
+        self._begin_beyond(t)
 
     def _take_implicit(self) -> None:
         """Put the implicit solver to work; what the fixed-point iteration allowed does not bind it."""

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from problems.analysis.ranges import RANGES, Range
+from problems.analysis.sizes import size_in_time
 from problems.derive.forward import Slopes
 from problems.evaluate.evaluator import Evaluator
 from problems.graph.fold import Copy
@@ -14,6 +15,7 @@ Array = NDArray[np.float64]
 MOST = 1 << 16  # intervals that are looked at side by side
 SMALLEST = 2.0**-44  # of the largest time: no shorter interval is divided
 ITERATIONS = 200  # of a root finder that bisects where it must
+ROUNDING = 4 * 2.0**-52  # of a function's terms: the error of its value
 
 
 class TooMany(Exception):  # noqa: N818 -- no error: shorter intervals are to be looked at
@@ -21,7 +23,7 @@ class TooMany(Exception):  # noqa: N818 -- no error: shorter intervals are to be
 
 
 class TimeFunction:
-    """A function of the time and of parameters, and its derivative in time.
+    """A function of the time and of parameters, its derivative in time and the size of its terms.
 
     Parameters
     ----------
@@ -32,9 +34,11 @@ class TimeFunction:
     def __init__(self, node: Node):
         values = Copy(Graph(node.graph.dof))
         slope = _InTime(values).of(node)
-        self._roots = [values.of(node), values.graph.const(0.0) if slope is None else slope]
+        value = values.of(node)
+        self._roots = [value, values.graph.const(0.0) if slope is None else slope]
+        self._terms = size_in_time(value)
 
-    def zeros(self, par: Array, pieces: Array, *, exhaust: bool) -> Array:
+    def zeros(self, par: Array, pieces: Array, *, exhaust: bool) -> tuple[Array, Array]:
         """Return the times at which the sign changes, of each term of a loop.
 
         Where an interval stays undecided, as where rounding alone makes the values, only the signs at its
@@ -49,6 +53,13 @@ class TimeFunction:
         exhaust : bool
             Whether to go on with what is known at the ends where there are too many intervals.
 
+        Returns
+        -------
+        times : ndarray, shape (n,)
+        resolutions : ndarray, shape (n,)
+            How far from each of them rounding may have the sign change: by the terms that are summed and
+            the slope. What is added inside the argument of another function is not among them.
+
         Raises
         ------
         TooMany
@@ -56,15 +67,17 @@ class TimeFunction:
         """
         loop = self._roots[0].loop
         terms = range(1 if loop is None else len(loop))
-        return np.concatenate([self._of_term(par, term, pieces, exhaust) for term in terms])
+        found = [self._of_term(par, term, pieces, exhaust) for term in terms]
+        times, resolutions = (np.concatenate(each) for each in zip(*found, strict=True))
+        return times, resolutions
 
-    def _of_term(self, par: Array, term: int, pieces: Array, exhaust: bool) -> Array:
+    def _of_term(self, par: Array, term: int, pieces: Array, exhaust: bool) -> tuple[Array, Array]:
         a, b = pieces[:-1], pieces[1:]
         found = []
         with np.errstate(all="ignore"):
             while a.size:
                 middle = 0.5 * (a + b)
-                value, slope = self._ranges(par, term, Range(a, b, middle))
+                value, slope = self._ranges(self._roots, par, term, Range(a, b, middle))
                 # At a pole the slope is infinite, and the function may fall while it is positive.
                 finite = np.isfinite(slope.low) & np.isfinite(slope.high)
                 monotonic = finite & ((slope.low >= 0.0) | (slope.high <= 0.0))
@@ -87,27 +100,30 @@ class TimeFunction:
                 )
             return self._solved(par, term, *(np.concatenate(each) for each in zip(*found, strict=True)))
 
-    def _solved(self, par: Array, term: int, a: Array, b: Array) -> Array:
-        """Return the times of a change of sign in those intervals whose ends have different signs."""
+    def _solved(self, par: Array, term: int, a: Array, b: Array) -> tuple[Array, Array]:
+        """Return what `zeros` does, of those intervals whose ends have different signs."""
         side = 0.5 * (a + b)
 
         def value(t: Array, side: Array) -> Array:
-            return self._ranges(par, term, Range(t, t, side))[0].low
+            return self._ranges(self._roots, par, term, Range(t, t, side))[0].low
 
         change = (value(a, side) > 0.0) != (value(b, side) > 0.0)
-        if not change.any():
-            return np.empty(0)
+        a, b, side = a[change], b[change], side[change]
+        if not a.size:
+            return a, b
         from scipy.optimize.elementwise import (
             find_root,  # few conditions need it, every process would load it
         )
 
         tolerances = {"xrtol": 2.0**-52, "xatol": 0.0, "fatol": 0.0, "frtol": 0.0}
-        bracket = a[change], b[change]
-        return find_root(value, bracket, args=(side[change],), tolerances=tolerances, maxiter=ITERATIONS).x
+        times = find_root(value, (a, b), args=(side,), tolerances=tolerances, maxiter=ITERATIONS).x
+        roots = [self._roots[1], self._terms]
+        slope, terms = (each.low for each in self._ranges(roots, par, term, Range(times, times, side)))
+        return times, np.fmin(ROUNDING * np.abs(terms / slope), b - a)
 
-    def _ranges(self, par: Array, term: int, t: Range) -> list[Range]:
+    def _ranges(self, roots: list[Node], par: Array, term: int, t: Range) -> list[Range]:
         evaluator = _Evaluator(RANGES, t[np.newaxis], None, Range.of(par[:, np.newaxis]), t.low.size)
-        return [rows[term] for rows in evaluator.rows(self._roots)]
+        return [rows[term] for rows in evaluator.rows(roots)]
 
 
 class _Evaluator(Evaluator):

@@ -64,7 +64,7 @@ class Switches:
 
     def times(
         self, par: NDArray[np.float64], near: float, far: float
-    ) -> tuple[NDArray[np.float64], float, float]:
+    ) -> tuple[NDArray[np.float64], dict[float, float], float, float]:
         """Return the times at which the field switches with these parameters, ascending.
 
         Parameters
@@ -78,6 +78,8 @@ class Switches:
         -------
         times : ndarray, shape (n,)
             Finite, and at least those of the interval.
+        resolutions : dict of float to float
+            Of those that were isolated: how far from the time rounding may have the field switch.
         near, far : float
             Where they are all known: less than asked for where there are too many, everywhere where they
             are a few.
@@ -85,14 +87,14 @@ class Switches:
         few = self._few(par) if self._fixed is None else self._fixed
         if few is not None:
             sign = np.copysign(1.0, far - near)
-            return few, -sign * np.inf, sign * np.inf
+            return few, {}, -sign * np.inf, sign * np.inf
         reach = far - near
         for _ in range(SHORTENED):
             try:
-                return self._isolated(par, near, near + reach, exhaust=False), near, near + reach
+                return *self._isolated(par, near, near + reach, exhaust=False), near, near + reach
             except TooMany:
                 reach *= SHORTER
-        return self._isolated(par, near, far, exhaust=True), near, far
+        return *self._isolated(par, near, far, exhaust=True), near, far
 
     def moved(self, before: NDArray[np.float64], after: NDArray[np.float64]) -> bool:
         """Whether the times differ with other parameters, or may."""
@@ -116,25 +118,27 @@ class Switches:
 
     def _isolated(
         self, par: NDArray[np.float64], near: float, far: float, *, exhaust: bool
-    ) -> NDArray[np.float64]:
-        """Return the times in an interval."""
+    ) -> tuple[NDArray[np.float64], dict[float, float]]:
+        """Return the times in an interval, and their resolutions."""
+        resolutions: dict[float, float] = {}
         low, high = min(near, far), max(near, far)
         pieces = _Evaluation(par).of
         known = np.array([low, high])
         for node in self._nodes:  # what is chosen inside a condition comes before it
             affine = pieces(node.args[0])
             if affine is None:
-                found = [
-                    self._function(node, i).zeros(par, known, exhaust=exhaust)
-                    for i in range(len(node.data.knots) if node.op == "table" else 1)
-                ]
+                found = []
+                for i in range(len(node.data.knots) if node.op == "table" else 1):
+                    zeros, near_them = self._function(node, i).zeros(par, known, exhaust=exhaust)
+                    resolutions.update(zip(zeros.tolist(), near_them.tolist(), strict=True))
+                    found.append(zeros)
             elif node.op in WITHOUT_END:
                 found = [_repeated(piece, low, high, 0.5 * (node.op == "round")) for piece in affine]
             else:
                 found = [_crossings(affine, _levels(node))]
             times = _sorted(found)
             known = np.union1d(known, times[(times > low) & (times < high)])
-        return known[1:-1]
+        return known[1:-1], resolutions
 
     def _function(self, node: Node, i: int) -> TimeFunction:
         """Return a function that changes its sign where a node switches: at its knot i, if it has some."""

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from integrators import HBVM, Gauss, integrate, integrate_many
+from integrators import HBVM, Gauss, Status, integrate, integrate_many
 from problems import Opaque, Problem, VectorField
 
 METHODS = [HBVM(), HBVM(k=8, s=7, tol=1e-12), Gauss(s=6, tol=1e-12)]
@@ -180,34 +180,52 @@ def test_a_jump_beside_a_breakpoint_is_seen(method, side):
         assert abs(solution.y[-1, 0] - exact_end) < 1e-9 or solution.warnings, distance
 
 
-def pulses(period, width, end):
-    """Return the field of y' = -y/10 + pulses around each period, and y at ``end`` from 0 at 0."""
-    field = VectorField(
-        lambda t, y, m: [
-            m.where(m.cos(2.0 * np.pi * t / period) > np.cos(np.pi * width), 1.0, 0.0) - 0.1 * y[0]
-        ],
-        dim=1,
-    )
-    starts = (np.arange(int(end / period) + 2) - 0.5 * width) * period
-    starts, ends = np.clip(starts, 0.0, end), np.clip(starts + width * period, 0.0, end)
-    return field, 10.0 * np.sum(np.exp(0.1 * (ends - end)) - np.exp(0.1 * (starts - end)))
+TRAINS = {  # conditions that hold in pulses, and where their middle is in the period
+    "cos": (lambda x, w, m: m.cos(2.0 * np.pi * x) > m.cos(np.pi * w), 0.0),
+    "sin": (lambda x, w, m: m.sin(2.0 * np.pi * x) > m.cos(np.pi * w), 0.25),
+    "round": (lambda x, w, m: m.abs(x - m.round(x)) < 0.5 * w, 0.0),
+    "floor": (lambda x, w, m: m.abs(x - m.floor(x) - 0.5) < 0.5 * w, 0.5),
+}
 
 
-def pulse_search(count):
-    """Return the largest error of some random trains of pulses."""
-    rng, worst = np.random.default_rng(5), 0.0
+def train(name):
+    """Return the field of y' = -y/10 + pulses, each of a part of the period."""
+    holds, _ = TRAINS[name]
+
+    def field(t, y, par, m):
+        return [m.where(holds(t / par.period, par.width, m), 1.0, 0.0) - 0.1 * y[0]]
+
+    return VectorField(field, dim=1, parameters={"period": 1.0, "width": 0.1}, name=f"train by {name}")
+
+
+FIELDS = {name: train(name) for name in TRAINS}
+PULSE_METHODS = [HBVM(), HBVM(k=8, s=4, tol=1e-8), Gauss(s=6, tol=1e-10)]
+
+
+def pulse_search(seed, count):
+    """Return which of some random trains of pulses end otherwise, far from the solution or with a warning."""
+    rng, wrong = np.random.default_rng(seed), []
     for _ in range(count):
-        end = rng.uniform(5.0, 40.0)
-        field, expected = pulses(rng.uniform(0.5, 3.0), rng.uniform(0.005, 0.2), end)
-        solution = integrate(Problem(field, y0=[0.0], t_end=end), HBVM(), [end])
-        worst = max(worst, abs(solution.y[-1, 0] - expected))
-    return worst
+        name, method = rng.choice(list(TRAINS)), PULSE_METHODS[rng.integers(3)]
+        end, period, width = rng.uniform(5.0, 40.0), rng.uniform(0.5, 3.0), 10.0 ** rng.uniform(-6.0, -0.7)
+        starts = (np.arange(-1, int(end / period) + 2) + TRAINS[name][1] - 0.5 * width) * period
+        first, last = np.clip(starts, 0.0, end), np.clip(starts + width * period, 0.0, end)
+        expected = 10.0 * np.sum(np.exp(0.1 * (last - end)) - np.exp(0.1 * (first - end)))
+        made = integrate(
+            Problem(FIELDS[name], y0=[0.0], t_end=end, parameters={"period": period, "width": width}),
+            method, [end],
+        )  # fmt: skip
+        error = abs(made.y[-1, 0] - expected) if made.status is Status.FINISHED else np.inf
+        if error > 1e-9 or made.warnings:  # measured 6e-11: rounding of a cosine of 1 moves its pulse so far
+            wrong.append((name, method, end, period, width, error, made.warnings, made.reason))
+    return wrong
 
 
-def test_no_pulse_of_a_train_is_missed():
-    assert pulse_search(6) < 1e-10  # 5 of 12 trains were wrong, by up to 0.1
+def test_no_pulse_of_a_train_is_missed_or_thought_to_be_a_discontinuity():
+    # Before: 5 of 12 were wrong; later 46 of 300 narrow ones underflowed, or warned.
+    assert pulse_search(5, 20) == []
 
 
 @pytest.mark.slow
-def test_no_pulse_of_a_train_is_missed_in_a_search():
-    assert pulse_search(200) < 1e-10
+def test_nor_is_any_in_a_search():
+    assert pulse_search(6, 600) == []

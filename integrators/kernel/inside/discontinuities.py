@@ -149,7 +149,7 @@ def differs_at_an_end(ctx):
 def look_at_ends(ctx):
     """As `differs_at_an_end`, by noise only where that was measured.
 
-    Where the field may jump, at a breakpoint, it is looked at just inside the step.
+    Where the field may jump, at a breakpoint, it is looked at just inside the step, beyond what rounding has.
     """
     discontinuities, surfaces = ctx.discontinuities, ctx.surfaces
     h, t = abs(ctx.h), ctx.t0
@@ -158,11 +158,15 @@ def look_at_ends(ctx):
     # Stages at both ends, in memory that the solved step does not need any more; idle lanes repeat the last.
     stages, times, values = ctx.scratch.old_stages, ctx.times, ctx.scratch.sums
     inside = max(BREAKPOINT_OFFSET * h, 2.0 * SHORTEST * abs(t))
-    inside = inside if ctx.h > 0.0 else -inside
-    times[0] = t + inside if discontinuities.boundary == START else t
+    sign = 1.0 if ctx.h > 0.0 else -1.0
+    times[0] = t
+    if discontinuities.boundary == START:
+        times[0] += sign * max(inside, discontinuities.resolution)
     end, _ = time_after(t, ctx.time_low, ctx.h)  # which is not beyond that of the integration by rounding
     for lane in range(1, lanes):
-        times[lane] = end - inside if ends_at_break(ctx) else end
+        times[lane] = end
+        if ends_at_break(ctx):
+            times[lane] -= sign * max(inside, ctx.controller.resolution)
     for d in range(rows):
         index = 8 * (d // 4) + 4 + d % 4 if second else d
         stages[lanes * d] = ctx.state[index]

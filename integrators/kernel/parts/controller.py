@@ -23,7 +23,8 @@ class Controller(Part):
     longest_constant = Real()  # the same where the field has the same value at all nodes of a step
     interval = Real()  # length of all that is integrated, from the trajectory's start; 0: unknown
     stop = Real()  # no step passes this time; infinite: none
-    breaks = Integer()  # 1: `stop` is a time at which the field may jump
+    breaks = Integer()  # 1: `stop` is a time at which the field may jump,
+    resolution = Real()  # as far from there as this by rounding
     attempts = Integer()  # at the step ahead that were rejected
     rejected = Integer()  # 1: `Context.values` are of a rejected step of `length`, from the present state
     no_time_scale = Integer()  # 1: the field at the start tells no time scale

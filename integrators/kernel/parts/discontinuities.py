@@ -5,7 +5,8 @@ from integrators.kernel.native.memory import Array, Integer, Part, Real
 MOST_RECORDED = 64
 
 # What is known of the field where a step ends: NOTHING; the values that its polynomial says, EXTRAPOLATED,
-# which are compared with those of the next; that they are right, SEEN. At a START it may jump.
+# which are compared with those of the next; that they are right, SEEN. At a START it may jump, as far from
+# there as `Discontinuities.resolution` by rounding.
 START, NOTHING, EXTRAPOLATED, SEEN = range(-1, 3)
 
 
@@ -32,4 +33,5 @@ class Discontinuities(Part):
     previous_last_coefficients = Array("rows")  # and in the previous step
     boundary = Integer()  # what is known of the previous step: START, NOTHING, EXTRAPOLATED, SEEN
     next_boundary = Integer()  # the same of the step ahead
+    resolution = Real()  # of the time of a START
     undone = Integer()  # 1: the field jumps before the end of the previous step

@@ -579,4 +579,4 @@ def arrive_on_surface(ctx):
     if surfaces.reached:
         surfaces.reached = 0
         ctx.length = ctx.controller.previous_length = 0.0
-        ctx.discontinuities.boundary = START
+        ctx.discontinuities.boundary, ctx.discontinuities.resolution = START, 0.0
