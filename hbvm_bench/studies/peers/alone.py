@@ -17,6 +17,7 @@ import numpy as np
 
 from integrators import registry
 from integrators.peers import load
+from integrators.peers.gravity import masses_and_constant
 from integrators.protocol import Array, Compiled, MethodBase, Samples, Stats, Status, Trajectories
 from problems import targets
 from problems.problem import System
@@ -122,20 +123,49 @@ class BatchProgram(Program):
             targets.heyoka(self.system),
             np.zeros((self.system.dim, lanes)),
             pars=np.zeros((self.system.n_par, lanes)),
-            **self.method.options(defaults=True),
+            **_options(self.method)[1],
         )
+
+
+def _options(method: MethodBase) -> tuple[bool, dict[str, Any]]:
+    """Return whether bodies are heyoka's own model, and the options of heyoka's integrator."""
+    options = method.options(defaults=True)
+    return options.pop("nbody"), options
 
 
 def _heyoka(system: System, method: MethodBase) -> Begin:
     """``taylor_adaptive(...).propagate_until(t_end)``."""
     hy = load("heyoka")
+    nbody, options = _options(method)
+    if nbody:
+        return _bodies_of_heyoka(system, options)
     integrator = hy.taylor_adaptive(
-        targets.heyoka(system), [0.0] * system.dim, pars=[0.0] * system.n_par, **method.options(defaults=True)
+        targets.heyoka(system), [0.0] * system.dim, pars=[0.0] * system.n_par, **options
     )
 
     def begin(y0: Array, par: Array, t0: float) -> Call:
         integrator.time, integrator.state[:], integrator.pars[:] = t0, y0, par
         return Call(integrator.propagate_until, lambda ended: (ended[3], integrator.state.copy()))
+
+    return begin
+
+
+def _bodies_of_heyoka(system: System, options: dict[str, Any]) -> Begin:
+    """Do the same with ``model.nbody``, whose state is position and velocity of one body after the other."""
+    hy = load("heyoka")
+    masses, G = masses_and_constant(system, system.pack({}))
+    model = hy.model.nbody(len(masses), masses=masses.tolist(), Gconst=G)
+    integrator = hy.taylor_adaptive(model, [0.0] * system.dim, **options)
+    scale = np.stack([np.ones_like(masses), masses])[:, :, None]
+
+    def begin(y0: Array, par: Array, t0: float) -> Call:
+        by_body = (y0.reshape(2, -1, 3) / scale).transpose(1, 0, 2)
+        integrator.time, integrator.state[:] = t0, by_body.ravel()
+
+        def end(ended: Any) -> tuple[int, Array]:
+            return ended[3], (integrator.state.reshape(-1, 2, 3).transpose(1, 0, 2) * scale).ravel()
+
+        return Call(integrator.propagate_until, end)
 
     return begin
 
@@ -153,9 +183,7 @@ def _rebound(system: System, method: Any) -> Begin:
     def begin(y0: Array, par: Array, t0: float) -> Call:
         sim: Any = library.Simulation()
         if bodies:
-            parameters = system.unpack(par)
-            masses = np.atleast_1d(parameters[bodies.masses])
-            sim.G = parameters[bodies.G] if isinstance(bodies.G, str) else bodies.G
+            masses, sim.G = masses_and_constant(system, par)
             x, p = y0.reshape(2, -1, 3)
             for m, (px, py, pz), (vx, vy, vz) in zip(masses, x, p / masses[:, None], strict=True):
                 sim.add(m=m, x=px, y=py, z=pz, vx=vx, vy=vy, vz=vz)

@@ -80,7 +80,8 @@ def test_the_bench_takes_the_library_s_steps_to_its_end(problem, method):
         assert samples.status is Status.FINISHED
         ends.append(samples.y[-1])
         steps.append(stepper.stats.steps)
-    assert steps[0] == steps[1] >= 50
+    assert min(steps) >= 50
+    assert steps[0] == steps[1] or "nbody" in method  # in momenta and in velocities
     # 0 but for REBOUND's fixed steps, whose clock we set anew: there 2e-12, from the last, shortened step
     assert np.abs(ends[0] - ends[1]).max() <= 1e-10 * np.abs(ends[1]).max()
 
