@@ -52,3 +52,16 @@ def test_an_ensemble_tells_of_each_start_that_is_too_small():
     problem = Problem(VectorField(lambda y: [-y[0]], dim=1), y0=[1.0], t_end=1.0)
     made = integrate_many(problem, HBVM(), starts=[[1.0], [1e-300], [1e-270]], times=[1.0])
     assert [len(said) for said in made.warnings] == [0, 1, 0]  # before: none
+
+
+def test_a_switching_surface_is_left_at_any_amplitude():
+    # Before: not_finite beyond 1e155, where squares of the distances to the surface overflow.
+    def contact(y, par, m):
+        return [y[1], -y[0] - m.where(y[0] > par.gap, 30.0 * (y[0] - par.gap), 0.0)]
+
+    system = VectorField(contact, dim=2, parameters={"gap": 0.0})
+    ends = []
+    for size in (1.0, 1e-200, 1e160, 1e200):
+        problem = Problem(system, y0=[size, 0.0], t_end=END, parameters={"gap": 0.3 * size})
+        ends.append(integrate(problem, HBVM(), [END]).y[-1] / size)
+    assert np.abs(np.diff(ends, axis=0)).max() < 1e-11  # measured 2.4e-14

@@ -12,6 +12,7 @@ from integrators.kernel.inside.discontinuities import previous_end
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.parts.surfaces import AT_STEP_END
 from integrators.kernel.simd.memory import call_field
+from integrators.kernel.step.control import INFINITY
 
 NEAR, FAR = 2.0**-28, 2.0**-20  # of how far states move in a step: distances from the surface
 STAYS = 0.5  # of a speed at the larger distance is left at the smaller one, if it does not vanish
@@ -117,20 +118,22 @@ def slides_along(ctx, i, g):
     surfaces, lanes, rows, states, values = ctx.surfaces, ctx.lanes, ctx.rows, ctx.stages, ctx.values
     moves, gradient, h = surfaces.state, surfaces.state + ctx.padded, ctx.controller.next_length
     rate = set_gradient(ctx, i, g)
-    square, rounding = 0.0, 0.0
+    largest, square, rounding = 0.0, 0.0, 0.0
     for d in range(rows):
-        square += (moves[d] * gradient[d]) ** 2
+        largest = max(largest, abs(moves[d] * gradient[d]))
         rounding += ROUNDING * abs(gradient[d] * component(ctx, d))
-    if not square > 0.0:
+    if not 0.0 < largest < INFINITY:
         return False
-    size = square**0.5
+    for d in range(rows):
+        square += (moves[d] * gradient[d] / largest) ** 2
+    size = square**0.5 * largest
     set_lanes(ctx, surfaces.times, ctx.t0, states)
     for d in range(rows):
-        part = moves[d] * (moves[d] * gradient[d] / square)
-        states[lanes * d + NEAR_ABOVE] += (NEAR * size - g) * part
-        states[lanes * d + FAR_ABOVE] += (FAR * size - g) * part
-        states[lanes * d + NEAR_BELOW] += (-NEAR * size - g) * part
-        states[lanes * d + FAR_BELOW] += (-FAR * size - g) * part
+        part = moves[d] * (moves[d] * gradient[d] / size)
+        states[lanes * d + NEAR_ABOVE] += (NEAR - g / size) * part
+        states[lanes * d + FAR_ABOVE] += (FAR - g / size) * part
+        states[lanes * d + NEAR_BELOW] += (-NEAR - g / size) * part
+        states[lanes * d + FAR_BELOW] += (-FAR - g / size) * part
     call_field(ctx.field, surfaces.times, states, ctx.par, values)
     ctx.counters.evaluations += 4
     set_curved(ctx, SHORT * h)
@@ -149,7 +152,7 @@ def slides_along(ctx, i, g):
         if (above if beyond > 0.0 else below) == 0.0:
             move = beyond * max(BEYOND * rounding, ROUNDING * size) - g
             for d in range(rows):
-                ctx.state[d] += move * moves[d] * (moves[d] * gradient[d] / square)
+                ctx.state[d] += move / size * (moves[d] * (moves[d] * gradient[d] / size))
     return above < 0.0 and below > 0.0
 
 

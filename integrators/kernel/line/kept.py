@@ -1,5 +1,6 @@
 """What a line integral keeps: the functions and the memory that a program needs for it."""
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -123,6 +124,11 @@ class Kept:
     def refusal(self, contexts: tuple[Any, Any], t: float) -> str:
         """Return why the step from t has ended as `NOT_KEPT`: the step of a pair of contexts, or a part."""
         culprit = next(context for context in contexts if context.change_rate != 0.0)
+        if not math.isfinite(culprit.change_rate):
+            return (
+                f"the rate of change of {self.names[culprit.culprit]} is not finite in the step from "
+                f"t = {t!r}; take units in which it is in the range of doubles."
+            )
         return (
             f"{self.names[culprit.culprit]} is not an invariant: in the step from t = {t!r} the terms of its "
             f"rate of change do not cancel, but leave {culprit.change_rate:.1e} of their size; leave it out."
