@@ -290,6 +290,7 @@ class Kvaerno5(DiffraxMethod):
     Notes
     -----
     Samples as of `Dopri8`. Evaluations are not counted: diffrax does not tell how many iterations it takes.
+    The method's third node is at 1.23 of a step: the field is evaluated beyond the last time.
 
     Examples
     --------

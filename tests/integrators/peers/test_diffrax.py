@@ -9,7 +9,7 @@ from integrators import Status, integrate
 from integrators.peers.diffrax import solve
 from integrators.peers.diffrax.methods import Dopri8, LeapfrogMidpoint, ReversibleHeun, SemiImplicitEuler
 from integrators.peers.heyoka.taylor import Taylor
-from problems import Hamiltonian, Problem, targets
+from problems import Hamiltonian, Problem, VectorField, targets
 
 FIXED = [SemiImplicitEuler, LeapfrogMidpoint, ReversibleHeun, Dopri8]
 
@@ -90,6 +90,18 @@ def test_the_samples_of_an_adaptive_solve_cost_steps_but_not_its_own_length_of_s
     # One more for each sample at most; were each sample followed by a short step, it would be two.
     assert few.stats.steps < many.stats.steps <= few.stats.steps + 41
     assert np.max(np.abs(few.y[-1] - many.y[-1])) < 1e-8  # 2e-10
+
+
+@pytest.mark.parametrize(
+    "method", [ReversibleHeun(h=0.3), Dopri8(h=0.3), Dopri8(rtol=1e-8, atol=1e-8)], ids=repr
+)
+def test_a_field_that_is_not_defined_beyond_the_end_is_integrated(method):
+    # Kvaerno5 has a node at 1.23 of its steps.
+    root = VectorField(lambda t, y, m: [m.sqrt(10.0 - t) ** 5], dim=1)
+    made = integrate(Problem(root, y0=[0.0], t_end=10.0), method, [3.3, 7.0, 10.0])
+    assert made.status is Status.FINISHED
+    error = np.abs(made.y[:, 0] - 2.0 / 7.0 * (10.0**3.5 - (10.0 - made.t) ** 3.5)).max()
+    assert error < (10.0 if isinstance(method, ReversibleHeun) else 1e-5)  # measured 0.6, 1e-9, 2.5e-7
 
 
 @pytest.mark.parametrize("solver", FIXED)

@@ -79,6 +79,32 @@ def loss(solver: Any, y0: Any, g: Any, direct: bool = False) -> Any:
 slopes = jax.jit(jax.grad(loss, argnums=(1, 2)), static_argnames=("solver", "direct"))
 
 
+@pytest.mark.parametrize(
+    ("solver", "controller"),
+    [(HBVM(k=8, s=4), dx.PIDController(rtol=1e-8, atol=1e-8)), (Gauss(s=3), dx.ConstantStepSize())],
+    ids=["adaptive", "fixed"],
+)
+def test_the_field_is_not_evaluated_outside_the_interval(solver: Any, controller: Any) -> None:
+    asked: list[float] = []
+
+    def driven(t: Any, y: Any, args: Any) -> Any:
+        jax.debug.callback(lambda t: asked.append(float(t)), t)
+        return jnp.stack([y[1], -y[0] + jnp.sqrt(args - t)])
+
+    @jax.jit
+    def solved(t0: Any, t1: Any) -> Any:
+        return dx.diffeqsolve(
+            dx.ODETerm(driven), solver, t0, t1, 0.3, jnp.array([1.0, 0.0]), args=t1,
+            stepsize_controller=controller, saveat=dx.SaveAt(ts=jnp.linspace(t0, t1, 7)),
+        ).ys  # fmt: skip
+
+    for t0, t1 in ((0.0, 10.0), (1.3, 4.7), (1e3, 1e3 + 0.7)):
+        assert np.isfinite(solved(t0, t1)).all()
+        jax.effects_barrier()
+        assert t0 <= min(asked) < max(asked) <= t1
+        asked.clear()
+
+
 def start() -> Any:
     return jnp.array([0.3, 1.5]), jnp.asarray(1.1)
 
