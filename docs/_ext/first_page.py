@@ -59,15 +59,15 @@ def headline() -> str:
 
 
 def default() -> str:
-    """Return the table of `HBVM()` beside heyoka: time, steps, and ratios for both vector widths."""
+    """Return the table of `HBVM()` beside heyoka: time, evaluations, and ratios for both vector widths."""
     cases = frame("speed/automatic")
     found = cost_ratio.ratios(cases, no_worse=("energy_max", "position_mean"))
-    lines = ["| problem | time | steps | AVX-512 | AVX2 |", "| :-- | --: | --: | --: | --: |"]
+    lines = ["| problem | time | evaluations | AVX-512 | AVX2 |", "| :-- | --: | --: | --: | --: |"]
     for name in DEFAULT:
         wide, narrow = found[found.problem == name].itertuples()
         ours = cases[(cases.title == name) & (cases.processor == wide.processor) & (cases.role == "ours")]
         less = f" ({wide.why})" if wide.why else ""
-        cells = (f"{name}{less}", seconds(wide.ours_seconds), f"{int(ours.steps.iloc[0]):,}")
+        cells = (f"{name}{less}", seconds(wide.ours_seconds), f"{int(ours.evaluations.iloc[0]):,}")
         lines.append(f"| {' | '.join(cells)} | {digits(wide.ratio)} | {digits(narrow.ratio)} |")
     return "\n".join(lines)
 
