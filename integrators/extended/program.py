@@ -15,7 +15,7 @@ from integrators.refusals import check_parameters, check_start, one_thread
 from integrators.running.times import COUNTABLE
 from integrators.stepping import ProgramBase, RestorableStepper
 from problems.errors import InputError
-from problems.graph.functions import FUNCTIONS as ELEMENTARY
+from problems.graph.functions import CALLED
 from problems.graph.nodes import reachable
 from problems.problem import System
 
@@ -27,8 +27,8 @@ def lacking(system: System) -> str | None:
     """Return what of a field double-double arithmetic does not have, such as ``m.erf``, or ``None``."""
     known = {function.__name__ for function in FUNCTIONS}
     for node in reachable(system.function("field").roots):
-        elementary = ELEMENTARY.get(node.op)
-        if node.op in ("where", "table") or (elementary and elementary.numba.partition("(")[0] not in known):
+        called = CALLED.get(node.op)
+        if node.op == "table" or (called and called.numba.partition("(")[0] not in known):
             return f"m.{node.op}"
     return None
 

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from problems.errors import InputError
 from problems.graph.fold import Fold
-from problems.graph.functions import FUNCTIONS
+from problems.graph.functions import CALLED
 from problems.graph.nodes import STATE, Node, T, reachable
 from problems.systems.base import System
 
@@ -118,7 +118,7 @@ def switches_in_time(system: System) -> bool:
 
 def has_kink(node: Node) -> bool:
     """Whether a node chooses, or is a function of which a derivative jumps."""
-    return node.op == "where" or (node.op in FUNCTIONS and not FUNCTIONS[node.op].smooth)
+    return node.op in CALLED and not CALLED[node.op].smooth
 
 
 def cyclic(system: System) -> list[int]:

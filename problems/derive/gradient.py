@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from problems.derive.function import Function, LoopTerm, Term
+from problems.graph.fold import Visitor
 from problems.graph.functions import FUNCTIONS, Slope
 from problems.graph.loops import Affine, Loop, Place, Stage
 from problems.graph.nodes import STATE, Graph, Node, is_power_of_two, reachable
@@ -111,7 +112,7 @@ def _added(parts: list[_Adjoint], graph: Graph) -> _Adjoint | None:
     return _Adjoint(common, total, den, parts[0].key)
 
 
-class _Sweep:
+class _Sweep(Visitor[None]):
     def __init__(self, root: Node) -> None:
         self.graph = root.graph
         self.nodes = reachable([root])
@@ -217,53 +218,33 @@ class _Sweep:
 
     def pull(self, node: Node, adjoint: _Adjoint) -> None:
         """Pass the adjoint of ``node`` on to its arguments."""
-        graph, key = self.graph, node.id
         active = [arg for arg in node.args if arg.flags & STATE] if node.op != "element" else []
         if len(active) > 1 and node.args[0] is not node.args[-1]:
-            adjoint = adjoint.divided(graph)
-        match node.op:
-            case "add":
-                for arg in reversed(node.args):
-                    self._give(arg, adjoint.scaled(_ONE, key))
-            case "sub":
-                self._give(node.args[1], adjoint.scaled(-_ONE, key))
-                self._give(node.args[0], adjoint.scaled(_ONE, key))
-            case "neg":
-                self._give(node.args[0], adjoint.scaled(-_ONE, key))
-            case "mul":
-                a, b = node.args
-                if a is b:
-                    self._give(a, adjoint.times(a, key, factor=Fraction(2)))
-                else:
-                    if b.flags & STATE:
-                        self._give(b, adjoint.times(a, key))
-                    if a.flags & STATE:
-                        self._give(a, adjoint.times(b, key))
-            case "div":
-                self._pull_quotient(node, adjoint)
-            case "pow":
-                (x,), n = node.args, node.data
-                self._give(x, adjoint.times(graph.int_power(x, n - 1), key, factor=Fraction(n)))
-            case "where":
-                condition, a, b = node.args
-                value, zero = adjoint.node(graph), graph.const(0.0)
-                for arg, (first, second) in ((b, (zero, value)), (a, (value, zero))):
-                    self._give(arg, _Adjoint(_ONE, graph.where(condition, first, second), None, key))
-            case "sum":
-                adjoint = adjoint.divided(graph)
-                self._give(node.args[0], adjoint.scaled(_ONE, key))
-            case "element":
-                stage, place = node.data
-                self._stages.setdefault(stage, []).append((node.loop, place, adjoint.node(graph)))
-            case "table":
-                (x,) = node.args
-                self._give(x, adjoint.times(graph.table(x, node.data.slope()), key))
-            case _:
-                slopes = FUNCTIONS[node.op].slopes(node)
-                for arg, slope in reversed([*zip(node.args, slopes, strict=True)]):
-                    self._give(arg, self._along(slope, adjoint, key))
+            adjoint = adjoint.divided(self.graph)
+        self.visit(node, [adjoint])
 
-    def _pull_quotient(self, node: Node, adjoint: _Adjoint) -> None:
+    def visit_add(self, node: Node, adjoint: _Adjoint) -> None:
+        for arg in reversed(node.args):
+            self._give(arg, adjoint.scaled(_ONE, node.id))
+
+    def visit_sub(self, node: Node, adjoint: _Adjoint) -> None:
+        self._give(node.args[1], adjoint.scaled(-_ONE, node.id))
+        self._give(node.args[0], adjoint.scaled(_ONE, node.id))
+
+    def visit_neg(self, node: Node, adjoint: _Adjoint) -> None:
+        self._give(node.args[0], adjoint.scaled(-_ONE, node.id))
+
+    def visit_mul(self, node: Node, adjoint: _Adjoint) -> None:
+        a, b = node.args
+        if a is b:
+            self._give(a, adjoint.times(a, node.id, factor=Fraction(2)))
+            return
+        if b.flags & STATE:
+            self._give(b, adjoint.times(a, node.id))
+        if a.flags & STATE:
+            self._give(a, adjoint.times(b, node.id))
+
+    def visit_div(self, node: Node, adjoint: _Adjoint) -> None:
         a, b = node.args
         key = node.id
         if b.flags & STATE:
@@ -276,6 +257,33 @@ class _Sweep:
             self._give(b, part)
         if a.flags & STATE:
             self._give(a, self._over(adjoint, b, key))
+
+    def visit_pow(self, node: Node, adjoint: _Adjoint) -> None:
+        (x,), n = node.args, node.data
+        self._give(x, adjoint.times(self.graph.int_power(x, n - 1), node.id, factor=Fraction(n)))
+
+    def visit_where(self, node: Node, adjoint: _Adjoint) -> None:
+        condition, a, b = node.args
+        value, zero = adjoint.node(self.graph), self.graph.const(0.0)
+        for arg, (first, second) in ((b, (zero, value)), (a, (value, zero))):
+            self._give(arg, _Adjoint(_ONE, self.graph.where(condition, first, second), None, node.id))
+
+    def visit_sum(self, node: Node, adjoint: _Adjoint) -> None:
+        self._give(node.args[0], adjoint.divided(self.graph).scaled(_ONE, node.id))
+
+    def visit_element(self, node: Node, adjoint: _Adjoint) -> None:
+        stage, place = node.data
+        self._stages.setdefault(stage, []).append((node.loop, place, adjoint.node(self.graph)))
+
+    def visit_table(self, node: Node, adjoint: _Adjoint) -> None:
+        (x,) = node.args
+        self._give(x, adjoint.times(self.graph.table(x, node.data.slope()), node.id))
+
+    def visit_operation(self, node: Node, *adjoints: _Adjoint) -> None:
+        (adjoint,) = adjoints
+        slopes = FUNCTIONS[node.op].slopes(node)
+        for arg, slope in reversed([*zip(node.args, slopes, strict=True)]):
+            self._give(arg, self._along(slope, adjoint, node.id))
 
     def _along(self, slope: Slope, adjoint: _Adjoint, key: int) -> _Adjoint:
         """Return the adjoint times a derivative."""

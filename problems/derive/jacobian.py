@@ -284,14 +284,6 @@ def _moved(graph: Graph, root: Node, loop: Loop, to: Loop, at: int) -> Node:
     """Return a node of ``loop`` in a loop whose list has the columns of ``loop`` from ``at`` on."""
 
     def leaf(node: Node) -> Node:
-        if node.loop is None:
-            return node
-        if node.op == "index":
-            return graph.index(node.data.widened(to.width, at), to)
-        source, place = node.data
-        place = place.widened(to.width, at)
-        if node.op == "symbol":
-            return graph.symbol(source, place, flags=node.flags, loop=to)
-        return graph.entry(source, place, to) if node.op == "entry" else graph.element(source, place, to)
+        return node if node.loop is None else graph.widened(node, to, at)
 
     return _copied(graph, root, loop, leaf)

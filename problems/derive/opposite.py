@@ -2,7 +2,8 @@
 
 from collections.abc import Hashable, Iterable
 
-from problems.graph.nodes import Node, reachable
+from problems.graph.fold import Fold
+from problems.graph.nodes import Node
 
 Signed = tuple[float, int]
 """A sign, and a number that all formulas with the same absolute value in all bits have."""
@@ -14,39 +15,47 @@ def opposite(pairs: Iterable[tuple[Node, Node]]) -> list[bool]:
     Sums and products may be in either order; of functions other than ``+ - * /``, odd powers and choices
     nothing is known but that equal arguments give equal values.
     """
-    pairs = list(pairs)
-    known: dict[int, Signed] = {}
-    numbers: dict[Hashable, int] = {}
-    for node in reachable(node for pair in pairs for node in pair):
-        args = [known[arg.id] for arg in node.args]
-        if node.op == "neg":
-            known[node.id] = -args[0][0], args[0][1]
-        else:
-            sign, key = _signed(node, args)
-            known[node.id] = sign, numbers.setdefault(key, len(numbers))
-    zero = numbers.get(("const", 0.0))
+    fold = _Signs()
     results = []
     for a, b in pairs:
-        (sign, number), (other, same) = known[a.id], known[b.id]
+        (sign, number), (other, same) = fold.of(a), fold.of(b)
+        zero = fold.numbers.get(("const", 0.0))
         results.append(number == same and (sign == -other or number == zero))
     return results
 
 
-def _signed(node: Node, args: list[Signed]) -> tuple[float, Hashable]:
-    match node.op:
-        case "const":
-            return (-1.0 if node.data < 0.0 else 1.0), ("const", abs(node.data))
-        case "mul" | "div":
-            (s, x), (t, y) = args
-            return s * t, (node.op, *(sorted([x, y]) if node.op == "mul" else (x, y)))
-        case "add" | "sub":
-            (s, x), (t, y) = args
-            (y, t), (x, s) = sorted([(x, s), (y, t if node.op == "add" else -t)], reverse=True)
-            return s, ("add", x, y, s * t)
-        case "pow":
-            sign, x = args[0]
-            return sign ** (node.data % 2), ("pow", x, node.data)
-        case "where":
-            condition, (s, x), (t, y) = args
-            return s, ("where", condition, x, y, s * t)
-    return 1.0, ("node", node.id)
+class _Signs(Fold[Signed]):
+    def __init__(self) -> None:
+        super().__init__()
+        self.numbers: dict[Hashable, int] = {}
+
+    def _signed(self, sign: float, *key: Hashable) -> Signed:
+        return sign, self.numbers.setdefault(key, len(self.numbers))
+
+    def visit_const(self, node: Node) -> Signed:
+        return self._signed(-1.0 if node.data < 0.0 else 1.0, "const", abs(node.data))
+
+    def visit_neg(self, node: Node, a: Signed) -> Signed:
+        return -a[0], a[1]
+
+    def visit_mul(self, node: Node, a: Signed, b: Signed) -> Signed:
+        return self._signed(a[0] * b[0], "mul", *sorted([a[1], b[1]]))
+
+    def visit_div(self, node: Node, a: Signed, b: Signed) -> Signed:
+        return self._signed(a[0] * b[0], "div", a[1], b[1])
+
+    def visit_add(self, node: Node, a: Signed, b: Signed) -> Signed:
+        (y, t), (x, s) = sorted([(a[1], a[0]), (b[1], b[0])], reverse=True)
+        return self._signed(s, "add", x, y, s * t)
+
+    def visit_sub(self, node: Node, a: Signed, b: Signed) -> Signed:
+        return self.visit_add(node, a, (-b[0], b[1]))
+
+    def visit_pow(self, node: Node, a: Signed) -> Signed:
+        return self._signed(a[0] ** (node.data % 2), "pow", a[1], node.data)
+
+    def visit_where(self, node: Node, condition: Signed, a: Signed, b: Signed) -> Signed:
+        return self._signed(a[0], "where", condition, a[1], b[1], a[0] * b[0])
+
+    def visit_operation(self, node: Node, *args: Signed) -> Signed:
+        return self._signed(1.0, "node", node.id)

@@ -6,7 +6,7 @@ import numpy as np
 
 from problems.evaluate.evaluator import Array, Numbers
 from problems.graph.arithmetic import ARITHMETIC
-from problems.graph.functions import FUNCTIONS
+from problems.graph.functions import CALLED
 
 
 def _guarded(function: Callable[..., float]) -> Callable[..., Array]:
@@ -23,9 +23,9 @@ def _guarded(function: Callable[..., float]) -> Callable[..., Array]:
 
 DOUBLES = Numbers(
     of=np.float64,
-    operations={name: _guarded(f.value) for name, f in FUNCTIONS.items()}
+    operations={name: _guarded(f.value) for name, f in CALLED.items()}
     | {name: record.value for name, record in ARITHMETIC.items()}
-    | {"pow": np.power, "where": lambda condition, a, b: np.where(condition > 0.0, a, b)},
+    | {"pow": np.power},
     rows=lambda values, n, columns: np.broadcast_to(values, (n, columns)),
     total=lambda terms: np.cumsum(terms, axis=0)[-1],
     stacked=np.stack,

@@ -102,12 +102,7 @@ class Evaluator(Fold[Any]):
 
     def _inside(self, roots: list[Node], loop: Loop) -> list[Any]:
         """Return the values of nodes of a loop, shape (terms, n) each; of others the same in each term."""
-        body: dict[int, Any] = {}
-        for node in reachable(roots, loop):
-            args = [body[arg.id] if arg.id in body else self.known[arg.id] for arg in node.reads]
-            body[node.id] = self.visit(node, args)
-        found = [body[root.id] if root.id in body else self.known[root.id] for root in roots]
-        return [self._numbers.rows(values, len(loop), self._n) for values in found]
+        return [self._numbers.rows(values, len(loop), self._n) for values in self.of_term(roots, loop)]
 
     def visit_const(self, node: Node) -> Any:
         return self._numbers.of(node.data)

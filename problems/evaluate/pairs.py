@@ -5,12 +5,11 @@ import operator
 import numpy as np
 from numpy.typing import ArrayLike
 
-from problems import double_double
 from problems.derive.function import Function
 from problems.double_double import DD, as_dd
 from problems.evaluate.evaluator import Array, Evaluator, Numbers
 from problems.graph.arithmetic import ARITHMETIC
-from problems.graph.functions import FUNCTIONS
+from problems.graph.functions import CALLED
 from problems.graph.nodes import reachable
 
 # Numbers held at once by a declared sum's terms, so that many states and many terms fit in memory.
@@ -35,12 +34,9 @@ def _total(terms: DD) -> DD:
 
 PAIRS = Numbers(
     of=DD,
-    operations={name: f.double_double for name, f in FUNCTIONS.items()}
+    operations={name: f.double_double for name, f in CALLED.items()}
     | {name: record.value for name, record in ARITHMETIC.items()}
-    | {
-        "pow": operator.pow,
-        "where": lambda condition, a, b: double_double.where(condition.rounded() > 0.0, a, b),
-    },
+    | {"pow": operator.pow},
     rows=_rows,
     total=_total,
     stacked=lambda rows: DD(np.stack([row.hi for row in rows]), np.stack([row.lo for row in rows])),

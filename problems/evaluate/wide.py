@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from problems.derive.function import Function
 from problems.evaluate.evaluator import Evaluator, Numbers
 from problems.graph.arithmetic import ARITHMETIC
-from problems.graph.functions import FUNCTIONS
+from problems.graph.functions import CALLED
 
 _DIGITS = 36
 _WIDE = mpmath.MPContext()  # of its own: the precision of mpmath.mp belongs to the user
@@ -37,15 +37,13 @@ def _guarded(function: Callable[..., Any], arguments: int) -> Callable[..., Any]
     return np.frompyfunc(guarded, arguments, 1)
 
 
+_OF_OTHER_NAMES: dict[str, Callable[..., Any]] = {
+    "abs": abs, "round": _WIDE.nint, "where": CALLED["where"].value
+}  # fmt: skip
 _OPERATIONS: dict[str, tuple[Callable[..., Any], int]] = {
-    **{
-        name: (getattr(_WIDE, name), f.arity) for name, f in FUNCTIONS.items() if name not in ("abs", "round")
-    },
+    **{name: (_OF_OTHER_NAMES.get(name) or getattr(_WIDE, name), f.arity) for name, f in CALLED.items()},
     **{name: (record.value, record.arity) for name, record in ARITHMETIC.items()},
-    "abs": (abs, 1),
-    "round": (_WIDE.nint, 1),
     "pow": (operator.pow, 2),
-    "where": (lambda condition, a, b: a if condition > 0 else b, 3),
 }
 
 

@@ -1,7 +1,7 @@
 """One walk over a graph: what differentiates, evaluates, analyses and prints are subclasses of it."""
 
 from collections.abc import Sequence
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from problems.graph.loops import Affine, Loop, Stage
 from problems.graph.nodes import Graph, Node, reachable
@@ -9,11 +9,24 @@ from problems.graph.nodes import Graph, Node, reachable
 R = TypeVar("R")
 
 
-class Fold(Generic[R]):
-    """A result for each node, made of the results of its arguments.
+class Visitor(Generic[R]):
+    """What is done with an operation.
 
     A subclass has a method ``visit_NAME(node, *results)`` for the operations that it treats in its own way,
-    and `visit_operation` for all others. Each node is visited once, after its arguments.
+    and `visit_operation` for all others.
+    """
+
+    def visit(self, node: Node, results: Sequence[Any]) -> R:
+        """Return the result of a node, from those of its arguments or what else the operations are given."""
+        return getattr(self, f"visit_{node.op}", self.visit_operation)(node, *results)
+
+    def visit_operation(self, node: Node, *results: Any) -> R:
+        """Return the result of an operation that has no method of its own."""
+        raise NotImplementedError(f"{type(self).__name__} has no {node.op}")
+
+
+class Fold(Visitor[R]):
+    """A result for each node, made of the results of its arguments: each is visited once, after these.
 
     Attributes
     ----------
@@ -24,20 +37,24 @@ class Fold(Generic[R]):
     def __init__(self) -> None:
         self.known: dict[int, R] = {}
 
+    def arguments(self, node: Node) -> Sequence[Node]:
+        """Return the nodes that the result of one is made of."""
+        return node.args
+
     def of(self, root: Node) -> R:
         """Return the result of a node."""
-        for node in reachable([root]):
+        for node in reachable([root], arguments=self.arguments):
             if node.id not in self.known:
-                self.known[node.id] = self.visit(node, [self.known[arg.id] for arg in node.args])
+                self.known[node.id] = self.visit(node, [self.known[arg.id] for arg in self.arguments(node)])
         return self.known[root.id]
 
-    def visit(self, node: Node, results: Sequence[R]) -> R:
-        """Return the result of a node from those of its arguments."""
-        return getattr(self, f"visit_{node.op}", self.visit_operation)(node, *results)
-
-    def visit_operation(self, node: Node, *results: R) -> R:
-        """Return the result of an operation that has no method of its own."""
-        raise NotImplementedError(f"{type(self).__name__} has no {node.op}")
+    def of_term(self, roots: Sequence[Node], loop: Loop) -> list[R]:
+        """Return the results of nodes in a loop, where those of what stands outside are known."""
+        body: dict[int, R] = {}
+        for node in reachable(roots, loop):
+            results = [body[arg.id] if arg.id in body else self.known[arg.id] for arg in node.reads]
+            body[node.id] = self.visit(node, results)
+        return [body[root.id] if root.id in body else self.known[root.id] for root in roots]
 
 
 class Copy(Fold[Node]):

@@ -44,7 +44,8 @@ class Elementary:
     value : callable
         The value at doubles; `ValueError` or `OverflowError` where it has none.
     derivative : callable or None
-        From nodes of a graph: the `Slope`, or one for each of several arguments; ``None`` if it is 0.
+        From nodes of a graph: the `Slope`, or one for each of several arguments; ``None`` if it is 0, or if
+        the chain rule is not what differentiates it.
     double_double : callable
         The value at numbers of twice the digits.
     arity : int
@@ -321,6 +322,23 @@ _RECORDS = (
 
 FUNCTIONS: dict[str, Elementary] = {record.name: record for record in _RECORDS}
 """All of them, by name."""
+
+_CHOICE = Elementary(
+    name="where",
+    arity=3,
+    value=lambda condition, a, b: a if condition > 0 else b,
+    derivative=None,
+    double_double=lambda condition, a, b: double_double.where(condition.rounded() > 0.0, a, b),
+    numpy="np.where({} > 0.0, {}, {})",
+    numba="where({}, {}, {})",
+    jax="jnp.where({} > 0.0, {}, {})",
+    heyoka="hy.select(hy.gt({}, 0.0), {}, {})",
+    latex=r"\operatorname{where}\left(%s, %s, %s\right)",
+    cost=1,
+    smooth=False,
+)
+CALLED: dict[str, Elementary] = FUNCTIONS | {_CHOICE.name: _CHOICE}
+"""What is evaluated and printed as a call: these, and the choice of one of two numbers."""
 
 OF_ONE_ARGUMENT = tuple(f.name for f in _RECORDS if f.arity == 1)
 """Those of one argument."""

@@ -19,6 +19,7 @@ import math
 import numbers
 from collections.abc import Callable, Hashable, Iterable
 from fractions import Fraction
+from operator import attrgetter
 from typing import Any, NoReturn
 
 import numpy as np
@@ -87,6 +88,10 @@ _BRANCH = (
 )
 
 
+READS = frozenset({"symbol", "index", "entry", "element"})
+"""Operations that read an input, a loop's index, one of some constants or a value of a stage."""
+
+
 class Node:
     """One operation of a graph; what a user's function sees as a number.
 
@@ -130,6 +135,11 @@ class Node:
     def reads(self) -> "tuple[Node, ...]":
         """The nodes whose values it is calculated from where it stands: a loop's are in the loop."""
         return () if self.op in ("element", "sum") else self.args
+
+    @property
+    def place(self) -> Any:
+        """Where an input, a constant or a value of a stage is read, or what an index is: a `Place`."""
+        return self.data if self.op == "index" else self.data[1]
 
     def __repr__(self) -> str:
         inside = ", ".join([f"#{arg.id}" for arg in self.args] + ([repr(self.data)] if self.data else []))
@@ -333,20 +343,24 @@ class Graph:
         return self.lifted(node, loop)
 
     def _of_loop(self, node: Node, loop: Loop) -> Node:
-        match node.op:
-            case "index":
-                return self.index(node.data.widened(loop.width), loop)
-            case "symbol" | "entry" | "element":
-                source, place = node.data
-                place = place.widened(loop.width)
-                if node.op == "symbol":
-                    return self.symbol(source, place, flags=node.flags, loop=loop)
-                return (
-                    self.entry(source, place, loop)
-                    if node.op == "entry"
-                    else self.element(source, place, loop)
-                )
+        if node.op in READS:
+            return self.widened(node, loop)
         return self.apply(node, tuple(self._lifted.get((arg.id, loop.id), arg) for arg in node.args))
+
+    def widened(self, node: Node, loop: Loop, at: int = 0) -> Node:
+        """Return a node of `READS` in a loop whose list has the columns of its own from ``at`` on."""
+        return self.elsewhere(node, node.place.widened(loop.width, at), loop)
+
+    def elsewhere(self, node: Node, place: Place, loop: Loop | None) -> Node:
+        """Return what a node of `READS` reads at another place, of a loop or (``None``) outside of all."""
+        match node.op:
+            case "symbol":
+                return self.symbol(node.data[0], place, flags=node.flags, loop=loop)
+            case "entry":
+                return self.entry(node.data[0], place, loop)
+            case "element":
+                return self.element(node.data[0], place, loop)
+        return self.const(float(place)) if isinstance(place, int) else self.index(place, loop)
 
     def keep(self, op: str, args: tuple[Node, ...], data: Any, flags: int, loop: Loop | None) -> Node:
         """Append an operation as it is, without any rewriting: one of a graph that was packed, or a sum."""
@@ -376,7 +390,7 @@ class Graph:
         """Return the node of one input: ``space`` is "t", "y", "par" or "out"."""
         return self._intern("symbol", (), (space, index), flags=flags, loop=loop)
 
-    def index(self, affine: Affine, loop: Loop) -> Node:
+    def index(self, affine: Affine, loop: Loop | None) -> Node:
         """Return the node of a loop index used as a number."""
         return self._intern("index", (), affine, loop=loop)
 
@@ -580,7 +594,7 @@ class Graph:
                 return self.sum(args[0], node.data)
             case "table":
                 return self.table(args[0], node.data)
-            case "const" | "symbol" | "index" | "entry" | "element":
+            case op if op == "const" or op in READS:
                 return node
             case _:
                 return self.call(node.op, *args)
@@ -607,7 +621,11 @@ def _key(op: str, args: tuple[Node, ...], data: Any, loop: Loop | None) -> Hasha
     return op, *[arg.id for arg in args]
 
 
-def reachable(roots: Iterable[Node], within: Loop | None = None) -> list[Node]:
+def reachable(
+    roots: Iterable[Node],
+    within: Loop | None = None,
+    arguments: Callable[[Node], Iterable[Node]] = attrgetter("args"),
+) -> list[Node]:
     """Return all nodes that ``roots`` depend on, arguments first; of a loop, those inside it only."""
     seen: dict[int, Node] = {}
     stack = list(roots)
@@ -615,5 +633,5 @@ def reachable(roots: Iterable[Node], within: Loop | None = None) -> list[Node]:
         node = stack.pop()
         if node.id not in seen and (within is None or node.loop is within):
             seen[node.id] = node
-            stack.extend(node.args)
+            stack.extend(arguments(node))
     return [seen[key] for key in sorted(seen)]

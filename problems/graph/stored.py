@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from problems import limits
 from problems.errors import InputError, shown
 from problems.graph.arithmetic import ARITHMETIC
-from problems.graph.functions import FUNCTIONS
+from problems.graph.functions import CALLED
 from problems.graph.nodes import PAR, P, Q, T
 
 _ARGUMENTS: dict[str, int | None] = {
@@ -28,9 +28,8 @@ _ARGUMENTS: dict[str, int | None] = {
     "index": 0,
     "pow": 1,
     "sum": 1,
-    "where": 3,
     "table": 1,
-    **{name: record.arity for name, record in (ARITHMETIC | FUNCTIONS).items()},
+    **{name: record.arity for name, record in (ARITHMETIC | CALLED).items()},
 }
 _LARGEST = 2**53  # of an index, up to which doubles and 64-bit integers are exact alike
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from problems.graph.functions import FUNCTIONS
+from problems.graph.functions import CALLED
 from problems.graph.nodes import Affine, Loop, Node
 from problems.targets.plan import Fill, Plan, Scatter
 from problems.targets.printer import Printer
@@ -14,7 +14,7 @@ class _ArrayPrinter(Printer):
     """Loops become gather, evaluate, scatter on arrays with one row per term."""
 
     def __init__(self, plan: Plan, library: str, functions: dict[str, str]) -> None:
-        super().__init__(plan, functions | {"where": library + ".where({} > 0.0, {}, {})"})
+        super().__init__(plan, functions)
         self._library = library
 
     def _table(self, values: np.ndarray) -> str:
@@ -117,7 +117,7 @@ class _NumpyPrinter(_ArrayPrinter):
 
 class _JaxPrinter(_ArrayPrinter):
     def __init__(self, plan: Plan) -> None:
-        super().__init__(plan, "jnp", {name: f.jax for name, f in FUNCTIONS.items()})
+        super().__init__(plan, "jnp", {name: f.jax for name, f in CALLED.items()})
         self.outputs: dict[int, str] = {}
 
     def store(self, place: int, value: str) -> None:
@@ -142,7 +142,7 @@ class _JaxPrinter(_ArrayPrinter):
 
 def numpy_text(plan: Plan, name: str) -> str:
     """Return ``def name(t, y, par, out)`` on numpy arrays; y is (dim,) or (dim, n)."""
-    printer = _NumpyPrinter(plan, "np", {name: f.numpy for name, f in FUNCTIONS.items()})
+    printer = _NumpyPrinter(plan, "np", {name: f.numpy for name, f in CALLED.items()})
     printer.write()
     return printer.finished(f"{name}(t, y, par, out)")
 

@@ -3,14 +3,12 @@
 from collections.abc import Callable
 
 from problems.errors import InputError
-from problems.graph.functions import FUNCTIONS
+from problems.graph.functions import CALLED
 from problems.graph.nodes import Affine, Node
 from problems.targets.plan import Plan
 from problems.targets.printer import Printer
 
-_FUNCTIONS = {name: f.heyoka for name, f in FUNCTIONS.items() if f.heyoka is not None} | {
-    "where": "hy.select(hy.gt({}, 0.0), {}, {})"
-}
+_FUNCTIONS = {name: f.heyoka for name, f in CALLED.items() if f.heyoka is not None}
 
 
 class _HeyokaPrinter(Printer):
@@ -18,7 +16,7 @@ class _HeyokaPrinter(Printer):
         if node.op == "symbol":  # an expression by itself: no variable is needed to hold it
             space, place = node.data
             self.names[node.id] = "t" if space == "t" else f"{space}[{place}]"
-        elif node.op in FUNCTIONS and node.op not in _FUNCTIONS:
+        elif node.op in CALLED and node.op not in _FUNCTIONS:
             raise InputError(
                 f"heyoka has no m.{node.op} that is right to all digits; use a method of another library."
             )

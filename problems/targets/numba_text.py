@@ -4,13 +4,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from problems.graph.functions import FUNCTIONS
-from problems.graph.nodes import Affine, Loop, Node
+from problems.graph.functions import CALLED
+from problems.graph.nodes import READS, Loop, Node
 from problems.targets.loops import Nest, Range, Table, nest, ranges
 from problems.targets.plan import Fill, Plan, Scatter
 from problems.targets.printer import Printer, variable
 
-_FUNCTIONS = {name: f.numba for name, f in FUNCTIONS.items()} | {"where": "where({}, {}, {})"}
+_FUNCTIONS = {name: f.numba for name, f in CALLED.items()}
 
 
 class _NumbaPrinter(Printer):
@@ -164,9 +164,8 @@ def _outer(body: Sequence[Node]) -> set[int]:
     outer: set[int] = set()
     inside = {node.id for node in body}
     for node in body:
-        if node.op in ("symbol", "index", "entry", "element"):
-            affine: Affine = node.data if node.op == "index" else node.data[1]
-            alone = affine.coefficients[1] == 0
+        if node.op in READS:
+            alone = node.place.coefficients[1] == 0
         else:
             alone = all(arg.id in outer for arg in node.args if arg.id in inside)
         if alone:

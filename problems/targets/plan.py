@@ -12,9 +12,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from problems.derive.function import Function, LoopTerm, Term
+from problems.graph.fold import Fold
 from problems.graph.functions import FUNCTIONS
 from problems.graph.loops import Loop, Stage
-from problems.graph.nodes import Graph, Node, reachable
+from problems.graph.nodes import READS, Graph, Node, reachable
 
 # Loops of at most this many operations in all are written out: 15 pairs of bodies are, 45 are not.
 SMALL = 700
@@ -143,48 +144,67 @@ class Plan:
         return total + sum(LOOP + sum(COST.get(n.op, 1) for n in scatter.body) for scatter in scatters)
 
 
-class _Expansion:
-    """Expands powers, and the declared sums that are small enough."""
+class _Rewriting(Fold[Node]):
+    """The same operations, powers as products."""
+
+    def __init__(self, graph: Graph, uses: Counter[int]) -> None:
+        super().__init__()
+        self.graph, self.uses = graph, uses
+
+    def visit_pow(self, node: Node, base: Node) -> Node:
+        return self.graph.expanded(base, node.data)
+
+    def visit_neg(self, node: Node, a: Node) -> Node:
+        if a.op == "sub" and self.uses[node.args[0].id] == 1:
+            return self.graph.sub(*a.args[::-1])  # -(a - b), used here only
+        return self.graph.neg(a)
+
+    def visit_operation(self, node: Node, *results: Node) -> Node:
+        return self.graph.apply(node, results)
+
+
+class _Expansion(_Rewriting):
+    """Writes out the declared sums that are small enough."""
 
     def __init__(self, graph: Graph, limit: int | None, roots: Sequence[Node]) -> None:
-        self.graph = graph
+        nodes = reachable(roots)
+        uses = Counter(root.id for root in roots)
+        uses.update(arg.id for node in nodes for arg in node.args)
+        super().__init__(graph, uses)
         self.limit = limit
-        self.done: dict[int, Node] = {}
         self._stages: dict[Stage, Stage] = {}
         self._values: dict[Stage, list[Node]] = {}
-        nodes = reachable(roots)
         self.whole = limit is None or not any(node.op == "element" for node in nodes)
         if not self.whole and limit is not None and _size(nodes) <= limit:
             self.whole, self.limit = True, None
         if self.whole and limit is not None and _written(nodes, limit) > MANY:
             self.whole = False
-        self._uses = Counter(root.id for root in roots)
-        self._uses.update(arg.id for node in nodes for arg in node.args)
         for node in nodes:
             if node.loop is None:
-                self.done[node.id] = self._outside(node)
+                self.known[node.id] = self.visit(node, [self.known[arg.id] for arg in node.reads])
 
-    def _outside(self, node: Node) -> Node:
-        if node.op == "sum":
-            return self._sum(node)
-        if node.op == "element":
-            stage, place = node.data
-            return (
-                self.values(stage)[place]
-                if self.whole
-                else self.graph.element(self.stage(stage), place, None)
-            )
-        return self._apply(node, self.done)
+    def visit_sum(self, node: Node, *_: Node) -> Node:
+        loop, root = node.data, node.args[0]
+        if not self.small(loop, [root]):
+            return self.graph.sum(self.of_term([root], loop)[0], loop)
+        first, *others = (term for (term,) in self.written_out([root], loop))
+        return sum(others, first)
+
+    def visit_element(self, node: Node, *_: Node) -> Node:
+        stage, place = node.data
+        if node.loop is None and self.whole:
+            return self.values(stage)[place]
+        return self.graph.element(self.stage(stage), place, node.loop)
 
     def stage(self, stage: Stage) -> Stage:
         """Return a stage whose loops stay loops, their nodes rewritten."""
         if stage not in self._stages:
             loops = []
             for loop, entries in stage.loops:
-                inside = self.inside([node for _, node in entries], loop)
+                inside = self.of_term([node for _, node in entries], loop)
                 places = [place for place, _ in entries]
                 loops.append((loop, tuple(zip(places, inside, strict=True))))
-            terms = tuple((place, self.done[node.id]) for place, node in stage.terms)
+            terms = tuple((place, self.known[node.id]) for place, node in stage.terms)
             self._stages[stage] = self.graph.stage(stage.size, tuple(loops), terms)
         return self._stages[stage]
 
@@ -198,7 +218,7 @@ class _Expansion:
                     for place, node in zip(places, nodes, strict=True):
                         chains[int(place[k])].append(node)
             for place, node in stage.terms:
-                chains[place].append(self.done[node.id])
+                chains[place].append(self.known[node.id])
             self._values[stage] = [_added(chain, self.graph) for chain in chains]
         return self._values[stage]
 
@@ -209,58 +229,34 @@ class _Expansion:
         operations = max(len(reachable(roots, loop)), len(roots))
         return self.limit is None or len(loop) * operations <= self.limit
 
-    def _apply(self, node: Node, done: dict[int, Node]) -> Node:
-        args = tuple(done[arg.id] if arg.id in done else self.done[arg.id] for arg in node.args)
-        if node.op == "pow":
-            return self.graph.expanded(args[0], node.data)
-        if node.op == "neg" and args[0].op == "sub" and self._uses[node.args[0].id] == 1:
-            return self.graph.sub(*args[0].args[::-1])  # -(a - b), used here only
-        return self.graph.apply(node, args)
-
-    def _sum(self, node: Node) -> Node:
-        loop, root = node.data, node.args[0]
-        if not self.small(loop, [root]):
-            return self.graph.sum(self.inside([root], loop)[0], loop)
-        total: Node | None = None
-        for (term,) in self.written_out([root], loop):
-            total = term if total is None else total + term
-        assert total is not None
-        return total
-
-    def inside(self, roots: Sequence[Node], loop: Loop) -> list[Node]:
-        """Rewrite nodes inside a loop that stays one."""
-        done: dict[int, Node] = {}
-        for node in reachable(roots, loop):
-            if node.op in ("symbol", "index", "entry"):
-                done[node.id] = node
-            elif node.op == "element":
-                done[node.id] = self.graph.element(self.stage(node.data[0]), node.data[1], loop)
-            else:
-                done[node.id] = self._apply(node, done)
-        return [done[root.id] if root.id in done else self.done[root.id] for root in roots]
-
     def written_out(self, roots: Sequence[Node], loop: Loop) -> list[list[Node]]:
         """Return the roots at every term of a loop."""
-        body = reachable(roots, loop)
-        places = {n.id: n.data[1].values(loop) for n in body if n.op in ("symbol", "entry", "element")}
-        places |= {n.id: n.data.values(loop) for n in body if n.op == "index"}
-        rows: list[list[Node]] = []
-        for k in range(len(loop)):
-            done: dict[int, Node] = {}
-            for node in body:
-                if node.op == "symbol":
-                    place = int(places[node.id][k])
-                    done[node.id] = self.graph.symbol(node.data[0], place, flags=node.flags)
-                elif node.op == "entry":
-                    done[node.id] = self.graph.const(float(node.data[0].values[places[node.id][k]]))
-                elif node.op == "element":
-                    done[node.id] = self.values(node.data[0])[places[node.id][k]]
-                elif node.op == "index":
-                    done[node.id] = self.graph.const(float(places[node.id][k]))
-                else:
-                    done[node.id] = self._apply(node, done)
-            rows.append([done[root.id] if root.id in done else self.done[root.id] for root in roots])
-        return rows
+        term = _Term(self, roots, loop)
+        return [term.written(k) for k in range(len(loop))]
+
+
+class _Term(_Rewriting):
+    """The nodes of a loop at one term of it after another."""
+
+    def __init__(self, outside: _Expansion, roots: Sequence[Node], loop: Loop) -> None:
+        super().__init__(outside.graph, outside.uses)
+        self.known, self._values = outside.known, outside.values
+        self._roots, self._loop, self._k = roots, loop, 0
+        reads = (node for node in reachable(roots, loop) if node.op in READS)
+        self._places = {node.id: node.place.values(loop).tolist() for node in reads}
+
+    def written(self, k: int) -> list[Node]:
+        """Return the roots at a term."""
+        self._k = k
+        return self.of_term(self._roots, self._loop)
+
+    def visit_symbol(self, node: Node) -> Node:
+        return self.graph.elsewhere(node, self._places[node.id][self._k], None)
+
+    visit_index = visit_entry = visit_symbol
+
+    def visit_element(self, node: Node, *_: Node) -> Node:
+        return self._values(node.data[0])[self._places[node.id][self._k]]
 
 
 def _added(chain: list[Node], graph: Graph) -> Node:
@@ -294,7 +290,7 @@ def written_out(function: Function) -> list[Node]:
             for place, node in zip(places, nodes, strict=True):
                 terms_of[int(place[k])].append(node)
     for nodes, terms in zip(terms_of, function.outputs, strict=True):
-        nodes.extend(expansion.done[term.node.id] for term in terms)
+        nodes.extend(expansion.known[term.node.id] for term in terms)
     return [_added(nodes, function.graph) for nodes in terms_of]
 
 
@@ -318,7 +314,7 @@ def make_plan(function: Function, *, limit: int | None = SMALL) -> Plan:
     for loop, entries in function.loops:
         roots = [entry.node for entry in entries]
         if not expansion.small(loop, roots):
-            inside = expansion.inside(roots, loop)
+            inside = expansion.of_term(roots, loop)
             kept.append((loop, [LoopTerm(e.index, n) for e, n in zip(entries, inside, strict=True)]))
             continue
         places = [entry.index.values(loop) for entry in entries]
@@ -327,7 +323,7 @@ def make_plan(function: Function, *, limit: int | None = SMALL) -> Plan:
                 step += 1
                 chains[int(place[k])].append(Term(node, step))
     for chain, terms in zip(chains, function.outputs, strict=True):
-        chain.extend(Term(expansion.done[term.node.id], term.key) for term in terms)
+        chain.extend(Term(expansion.known[term.node.id], term.key) for term in terms)
 
     plan = Plan(len(chains))
     covered = _scatters(plan, kept)
