@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from integrators.caveats import FEWEST, detects_discontinuities
 from integrators.events.event import Event
-from integrators.kernel import routes, tables
+from integrators.kernel import routes, tables, tolerance
 from integrators.kernel.along import batch_along
 from integrators.kernel.batch import Batch, prepare_batch
 from integrators.kernel.batch_events import WithEvents
@@ -54,14 +54,6 @@ from problems.analysis.switches import Switches
 from problems.errors import InputError
 from problems.problem import Problem, System
 from problems.targets.time_scale import time_scale
-
-MARGIN = 0.9
-"""Part of the length allowed that steps aim at, besides `integrators.kernel.step.control.SAFETY`.
-
-Errors of order 25 and more vary strongly from step to step, and a rejected step costs as
-much as one that is taken: with 1 a fifth of the steps are rejected and all problems of the
-race take 5 to 20 % longer.
-"""
 
 OF_A_BODY, OF_A_COMPONENT = 1e-6, 1e-4
 """What the field of a block counts as at least, as a part of the largest in its group.
@@ -539,7 +531,7 @@ class AdaptiveProgram(HBVMProgram):
         if c.route != tables.THROUGH:
             self._fixed["raw_matrix"] = tables.rounded(c)
         self._extrapolations = tables.extrapolations(c) if c.route > tables.THROUGH else aligned(0)
-        self.degree = tables.degree_of_error(k, s)
+        self.degree = tolerance.degree_of_error(k, s)
         basis = legendre(c.arrays["nodes"].reshape(-1), k) * c.arrays["weights"].reshape(-1)[:, None]
         middle = max(1, (k - 4) // 2)
         degrees = [*tables.degrees_judged(k, s), min(middle, k - 1), min(middle + 1, k - 1)]
@@ -653,14 +645,12 @@ class AdaptiveProgram(HBVMProgram):
         context.controller.allowed_quadrature_error = (
             math.inf if self.quadrature_error is None else self.quadrature_error
         )
-        context.controller.error_aim = math.log(self.tol) / (2 * self.degree + 1) + math.log(MARGIN)
-        context.estimate.error_decay = self.tol ** (0.5 / self.degree)
+        context.controller.error_aim = tolerance.aim(self.tol, self.degree)
+        context.estimate.error_decay = tolerance.decay(self.tol, self.degree)
         if self.quadrature_error is not None:
             last = self.constants.k - 1
-            context.controller.quadrature_error_aim = math.log(self.quadrature_error) / (
-                2 * last + 1
-            ) + math.log(MARGIN)
-            context.estimate.quadrature_error_decay = self.quadrature_error ** (0.5 / last)
+            context.controller.quadrature_error_aim = tolerance.aim(self.quadrature_error, last)
+            context.estimate.quadrature_error_decay = tolerance.decay(self.quadrature_error, last)
         context.discontinuities.doubt, context.discontinuities.slowest_decay = self._doubt, self._slowest
         context.discontinuities.negligible = self._negligible
         context.surfaces.code = self._sides
@@ -742,7 +732,7 @@ def _decays(k: int, m: int, tol: float, middle: int, looks: bool) -> tuple[float
     """
     if not looks:
         return math.inf, math.inf
-    smooth, last = tol ** (0.5 / m), k - 1
+    smooth, last = tolerance.decay(tol, m), k - 1
     at_discontinuity = ((middle + 0.5) / last) ** 2
     doubt = min(10.0 * smooth ** (last - min(3, m - 1)), 0.1 / last**2)
     return doubt, max(at_discontinuity / 4.0, 6.0 * smooth ** (last - middle - 1))

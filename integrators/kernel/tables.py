@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from integrators.kernel.native import binary, store
 from integrators.kernel.native.memory import aligned
 from integrators.kernel.routes import PER_OCTAVE, THROUGH, WIDE
+from integrators.kernel.tolerance import degree_of_error
 from problems.double_double import DD
 
 Array = NDArray[np.float64]
@@ -295,11 +296,6 @@ def fixed(constants: Constants) -> dict[str, Array]:
         "position_weights_low": _vector(a["position_weights_low"]),
         "recurrence": recurrence(constants.modes),
     }
-
-
-def degree_of_error(k: int, s: int) -> int:
-    """Return the degree of the coefficient that estimates a step's error."""
-    return s if k > s else s - 1  # P_s vanishes at the nodes of the rule with s nodes
 
 
 def degrees_judged(k: int, s: int) -> tuple[int, ...]:

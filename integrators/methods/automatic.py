@@ -13,6 +13,7 @@ of two methods' costs are right to a third there. Other processors were not meas
 
 from dataclasses import dataclass
 
+from integrators.kernel.tolerance import error_order
 from problems.analysis.structure import degree, degree_of
 from problems.analysis.switches import depends_on_time_between_switches
 from problems.derive.function import Function
@@ -174,9 +175,9 @@ class Work:
         tol, quadrature_error : float
             What bounds the step; ``None``: its quadrature is exact, or of no interest.
         """
-        r = tol ** (1 / (2 * s - 1))
+        r = tol ** (1.0 / error_order(s - 1))
         if quadrature_error is not None:
-            r = min(r, quadrature_error ** (1 / (2 * k - 3)))
+            r = min(r, quadrature_error ** (1.0 / error_order(k - 2)))
         factor = 1.0 if self.second else FIRST_ORDER
         per_length = B + C / s
         length = min(4 * r / (1 - r * r), (MEAN_ITERATIONS / factor - A) / per_length)

@@ -21,7 +21,7 @@ from integrators.kernel.parts.discontinuities import EXTRAPOLATED
 from integrators.kernel.parts.implicit import FIXED_POINT
 from integrators.kernel.simd.memory import call_steps, put, splat8
 from integrators.kernel.step.begin import INFINITY, can_extrapolate
-from integrators.kernel.step.control import error_power, is_distinct, quadrature_error_power
+from integrators.kernel.step.control import error_power, is_distinct
 from integrators.kernel.step.rule import FIRST_RATE, SMALLEST
 from integrators.kernel.step.size import speed_of
 from integrators.kernel.trajectory.anew import reset
@@ -229,7 +229,7 @@ def set_tolerances(group, ctx):
     )
     group.error_power, group.quadrature_error_power = (
         error_power(controller.error_degree),
-        quadrature_error_power(ctx.k),
+        error_power(ctx.k - 1),
     )
     group.error_aim, group.quadrature_error_aim = controller.error_aim, controller.quadrature_error_aim
     group.error_decay, group.quadrature_error_decay = estimate.error_decay, estimate.quadrature_error_decay

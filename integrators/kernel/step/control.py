@@ -2,6 +2,7 @@
 
 from math import log
 
+from integrators.kernel import tolerance
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.operations import binary_log, greatest, least, opposite, size, where
 
@@ -23,6 +24,8 @@ SHORTEST = 2.0**-48  # of the time: a shorter step cannot be told from none
 TIME_TOLERANCE = 2.0**-50  # times whose relative difference is at most this are the same
 INFINITY = float("inf")
 TINY = 1e-300  # an estimated error of 0 counts as this
+
+error_order = compiled(tolerance.error_order)
 
 
 @compiled
@@ -66,13 +69,7 @@ def is_good(error, allowed, quadrature_error, allowed_quadrature_error):
 @compiled
 def error_power(degree):
     """Return one over the order of the error that is estimated by the coefficient of a degree."""
-    return 1.0 / (2.0 * degree + 1.0)
-
-
-@compiled
-def quadrature_error_power(k):
-    """Return one over the order of the quadrature's error with k nodes, as it is estimated."""
-    return 1.0 / (2.0 * k - 1.0)
+    return 1.0 / error_order(degree)
 
 
 @compiled

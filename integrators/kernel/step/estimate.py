@@ -25,7 +25,7 @@ from integrators.kernel.step.coefficients import (
     coefficient_of_two,
     take_coefficients,
 )
-from integrators.kernel.step.control import INFINITY, TINY, is_good
+from integrators.kernel.step.control import INFINITY, TINY, error_power, is_good
 from integrators.kernel.step.fixed_point import evaluate
 from integrators.kernel.step.rounding import (
     beyond_noise,
@@ -486,7 +486,7 @@ def first_length(ctx):
     rate = speed
     if position > 0.0:
         rate = max(speed / position, (pull / position) ** 0.5)
-    length = controller.allowed_error ** (1.0 / (2.0 * controller.error_degree + 1.0))
+    length = controller.allowed_error ** error_power(controller.error_degree)
     controller.no_time_scale = 0 if position > 0.0 and 0.0 < rate < INFINITY else 1
     return max(length / rate, RESTART * abs(ctx.t0)) if 0.0 < rate < INFINITY else length
 

@@ -20,6 +20,7 @@ from integrators.kernel.parts.estimate import AT_ERROR, GAMMA_0, GAMMA_3
 from integrators.kernel.simd.memory import call_entry, get, total
 from integrators.kernel.simd.operations import two_sum
 from integrators.kernel.simd.views import doubles, integers
+from integrators.kernel.step.control import error_power
 from integrators.kernel.step.fixed_point import evaluate
 from integrators.kernel.step.sample import read, write
 from integrators.kernel.step.stages import offset
@@ -220,8 +221,7 @@ def bound_steps(memory, ctx, h):
     """Let no step be longer than the vectors' errors allow, the last one having been of length h."""
     controller, factor = ctx.controller, LONGER_STEP
     if memory.error > 0.0:
-        power = 1.0 / (2.0 * controller.error_degree + 1.0)
-        factor = SAFETY * (LARGEST_ERROR / memory.error) ** power
+        factor = SAFETY * (LARGEST_ERROR / memory.error) ** error_power(controller.error_degree)
     if factor < LONGER_STEP:
         controller.longest = min(memory.longest, abs(h) * max(factor, SHORTER))
     else:

@@ -46,7 +46,6 @@ from integrators.kernel.step.control import (
     is_good,
     log_of_order,
     log_ratio,
-    quadrature_error_power,
     room_for_longer,
 )
 from integrators.kernel.step.estimate import (
@@ -173,7 +172,7 @@ def length_factor(ctx, error, quadrature_error, most_growth, implicit):
     evident = estimated.evident_error >= error
     quadrature_evident = estimated.evident_quadrature_error >= quadrature_error
     error = log_of_order(error, error_power(controller.error_degree))
-    quadrature_error = log_of_order(quadrature_error, quadrature_error_power(ctx.k))
+    quadrature_error = log_of_order(quadrature_error, error_power(ctx.k - 1))
     controller.error_ahead, controller.quadrature_error_ahead = error, quadrature_error
     factor, in_doubt = as_errors_allow(
         error,

@@ -21,6 +21,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from integrators.coefficients.legendre import polynomials, tables
+from integrators.kernel.tolerance import error_order
 from integrators.options import Stages
 from integrators.peers import load
 from problems.checks import checked
@@ -70,7 +71,7 @@ class _LineIntegral(dx.AbstractImplicitSolver[_Carried], dx.AbstractAdaptiveSolv
 
     def error_order(self, terms: Any) -> int:
         """Order of the error estimate of a step, 2s + 1."""
-        return 2 * self.s + 1
+        return int(error_order(self.s))
 
     def func(self, terms: Any, t0: Any, y0: Any, args: Any) -> Any:
         """Evaluate the vector field."""

@@ -14,6 +14,7 @@ added, and positions and velocities carry along what their last addition rounded
 import numpy as np
 from numba import types
 
+from integrators.kernel import tolerance
 from integrators.kernel.native import binary as native
 from integrators.plugins.rebound import layout as at
 from integrators.plugins.rebound.memory import (
@@ -56,6 +57,8 @@ VECTORS = 6
 # the iteration before, velocities at the stages. After them single rows: a sum, the positions and velocities.
 BASE, NEW, OLD, FAST = range(4)
 SUM, Q, V = range(3)
+
+error_order = compiled(tolerance.error_order)
 
 # Functions of REBOUND, and one of ours, that compiled code calls.
 _update = types.ExternalFunction("hbvm_rebound_update_acceleration", types.void(types.int64))
@@ -362,7 +365,7 @@ def step(simulation, state):
             means, lasts = work[0], work[1]  # the displacements have been used
             error = local_error(h, v, number[at.S], to_legendre(table), forces, means, lasts, bodies)
             problem, solved = at.UNRESOLVED, error <= most
-            wanted = SAFETY * (most / max(error, TINY)) ** (1.0 / (2 * number[at.S] + 1))
+            wanted = SAFETY * (most / max(error, TINY)) ** (1.0 / error_order(number[at.S]))
             factor = min(LONGER, max(SHORTER, wanted))
         if solved or not varies or t + factor * h == t:
             break

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.integrate import DenseOutput, OdeSolver
 
 from integrators.coefficients.legendre import legendre_integrals
+from integrators.kernel.tolerance import degree_of_error, error_order
 from integrators.plugins.scipy.newton import Newton
 from integrators.plugins.scipy.stages import Solved, Stages
 
@@ -72,8 +73,8 @@ class PythonSteps:
         self._solver, self._s, self._automatic = solver, s, k is None
         self._by_a_step = interpolant == "step"
         self._stages = Stages(solver, 2 * s if k is None else k, s)
-        # Of the estimate of a step's error; without gamma_s it is one of a lower order.
-        self._order = 2 * s - 1 if k == s > 1 else 2 * s + 1
+        # One node knows gamma_1 from the field at the start of the step.
+        self._order = error_order(degree_of_error(self.k, s) if s > 1 else 1)
         self._newton = Newton(solver, s, jac, jac_sparsity)
         self._stiff = False
         self._limited = 0  # steps in a row that only the fixed point keeps so short
@@ -137,12 +138,12 @@ class PythonSteps:
                 if cuts == CUTS and self._noisy == 0 and unseen > SHRINK * unseen_uncut:
                     h_abs, self._noisy = uncut, NOISY_STEPS
                 else:
-                    h_abs *= max(SHRINK, SAFETY * unseen ** (-1.0 / self.k))
+                    h_abs *= max(SHRINK, self._until_seen(unseen))
             else:
                 self._noisy = max(self._noisy - 1, 0)
                 factor = self._factor(h_abs, error, solved.rate, rejected)
                 if unseen > 0.0 and not self._stiff and self.k >= FEW_NODES:
-                    factor = max(SHRINK, min(factor, SAFETY * unseen ** (-1.0 / self.k)))
+                    factor = max(SHRINK, min(factor, self._until_seen(unseen)))
                 self._length = h_abs * factor
                 self._error_old = error
                 return t_new, solved
@@ -190,9 +191,13 @@ class PythonSteps:
         signed = h * solver.direction
         second_derivative = norm((solver.fun(t + signed, y + signed * f) - f) / scale) / h
         fastest = max(slope, second_derivative)
-        wanted = (0.01 / fastest) ** (1.0 / (2 * self._s + 1)) if fastest > 1e-15 else max(1e-6, 1e-3 * h)
+        wanted = (0.01 / fastest) ** (1.0 / error_order(self._s)) if fastest > 1e-15 else max(1e-6, 1e-3 * h)
         self._length = min(100.0 * h, wanted, span, solver.max_step)
         return self._length
+
+    def _until_seen(self, unseen: float) -> float:
+        """Return by how much a step is longer of whose coefficients k nodes miss nothing; see `_unseen`."""
+        return SAFETY * unseen ** (-1.0 / self.k)
 
     def _factor(self, h_abs: float, error: float, rate: float, rejected: bool) -> float:
         """Return by how much the next step is longer: predictive control, and what the solver needs."""

@@ -4,9 +4,13 @@ import ast
 from pathlib import Path
 
 import integrators.plugins
-from integrators.kernel import tables
+from integrators.kernel import tables, tolerance
+from integrators.kernel.step import control
 from integrators.kernel.step import rule as kernel
+from integrators.methods import automatic
 from integrators.plugins import rule
+from integrators.plugins.rebound import step as rebound
+from integrators.plugins.scipy import python as scipy
 
 FOLDER = Path(integrators.plugins.__path__[0])
 
@@ -28,3 +32,9 @@ def test_no_plugin_has_one_of_its_own():
         for node in ast.walk(ast.parse(path.read_text())):
             names = [target.id for target in getattr(node, "targets", ()) if isinstance(target, ast.Name)]
             assert not {*names} & {*rule.__all__}, path
+
+
+def test_whoever_chooses_steps_has_the_order_of_their_errors_from_one_function():
+    interpreted = (scipy.error_order, automatic.error_order)
+    compiled = (control.error_order.py_func, rebound.error_order.py_func)
+    assert {*interpreted, *compiled} == {tolerance.error_order}
