@@ -55,8 +55,8 @@ def on_lanes(function: Any, lanes: int, *, par: bool = False) -> tuple[Any, Argu
 
     Parameters are the same in all lanes, or with ``par`` rows like the stages.
     """
+    from integrators.kernel.native import functions  # noqa: F401 -- gives sin, exp, ... a meaning on lanes
     from integrators.kernel.native.jit import compiled
-    from integrators.kernel.simd import functions  # noqa: F401 -- gives sin, exp, ... a meaning on lanes
     from integrators.kernel.simd.lanes import Lanes
     from integrators.kernel.simd.views import DOUBLES, Rows
 

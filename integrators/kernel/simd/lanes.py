@@ -311,3 +311,17 @@ def somewhere(typing, mask):
         return builder.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
 
     return types.boolean(mask), generate
+
+
+@intrinsic
+def rarely(typing, condition):
+    """Return a condition that rarely holds: what is called then is not inlined."""
+
+    def generate(context, builder, sig, args):
+        kind, name = ir.IntType(1), "llvm.expect.i1"
+        expect = builder.module.globals.get(name) or ir.Function(
+            builder.module, ir.FunctionType(kind, [kind] * 2), name
+        )
+        return builder.call(expect, [args[0], ir.Constant(kind, 0)])
+
+    return types.boolean(types.boolean), generate
