@@ -46,7 +46,7 @@ def times_of(system, par):
 def test_no_switch_of_a_periodic_condition_is_missed(name):
     condition = PERIODIC[name]
     system = VectorField(lambda t, m: [m.where(condition(t, m), 1.0, 0.0)], dim=1)
-    times, near, far = Switches(system).times(system.pack(), 0.1, 30.0)
+    times, _, near, far = Switches(system).times(system.pack(), 0.1, 30.0)
     assert (near, far) == (0.1, 30.0)
     ends = np.concatenate([[0.1], times, [30.0]])
     parts = np.linspace(0.01, 0.99, 50)[:, None]
@@ -57,7 +57,7 @@ def test_no_switch_of_a_periodic_condition_is_missed(name):
 
 def test_many_switches_come_in_parts():
     system = VectorField(lambda t, m: [m.where(m.cos(2 * np.pi * t) > 0.5, 1.0, 0.0)], dim=1)
-    times, near, far = Switches(system).times(system.pack(), 0.0, 1e7)
+    times, _, near, far = Switches(system).times(system.pack(), 0.0, 1e7)
     assert near == 0.0
     assert far == 1e7 / 2.0**12
     assert times.size == pytest.approx(2 * far, abs=2)
