@@ -1,7 +1,10 @@
 """What trajectories do where they meet a switching surface: cross, slide, stop, or begin to move."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from integrators import HBVM, Gauss, Status, integrate
 from problems import Problem, VectorField
@@ -53,6 +56,69 @@ def test_a_rocket_lifts_off_from_two_surfaces_at_once(method, drag):
     assert found.status is Status.FINISHED
     expected = [11.86912303, 23.81693471, 0.95] if drag == 0.0 else [11.61731074, 22.81758885, 0.95]
     assert np.abs(found.y[-1] - expected).max() < 1e-6  # measured 5e-9, the digits given
+
+
+def rocket(t, y, par, m):
+    """Height, velocity and mass; it stands until the thrust exceeds the weight."""
+    h, v, mass = y
+    a = (par.thrust * t - par.drag * v * m.abs(v)) / mass - par.g
+    return [v, m.where((h <= 0) & (a < 0), 0.0, a), -par.burnt * t]
+
+
+def motor(t, y, par, m):
+    """Angle and speed; it rests until the torque exceeds the friction."""
+    rests = (y[1] <= 0) & (par.torque * t < par.friction)
+    return [y[1], m.where(rests, 0.0, par.torque * t - par.friction - par.viscous * y[1])]
+
+
+ROCKET = VectorField(rocket, dim=3, parameters={"thrust": 20.0, "drag": 0.0, "g": 9.81, "burnt": 0.025})
+MOTOR = VectorField(motor, dim=2, parameters={"torque": 1.0, "friction": 1.0, "viscous": 0.0})
+
+
+def drawn_start(seed):
+    """Return the problem of a rocket or motor, and its last state, by the field after the start alone."""
+    rng = np.random.default_rng(seed)
+    par = SimpleNamespace(
+        thrust=rng.uniform(8.0, 40.0), drag=rng.choice([0.0, 10.0 ** rng.uniform(-3.0, 0.0)]),
+        g=rng.uniform(2.0, 10.0), burnt=rng.uniform(0.0, 0.05), torque=rng.uniform(0.5, 4.0),
+        friction=rng.uniform(0.3, 3.0), viscous=rng.choice([0.0, rng.uniform(0.1, 2.0)]),
+    )  # fmt: skip
+    if rng.uniform() < 0.5:  # thrust t = g (1 - burnt t^2/2)
+        root = np.sqrt(par.thrust**2 + 2.0 * par.burnt * par.g**2)
+        system, y0, begins = ROCKET, [0.0, 0.0, 1.0], 2.0 * par.g / (par.thrust + root)
+        y = [0.0, 0.0, 1.0 - par.burnt * begins**2 / 2]
+
+        def ahead(t, y):
+            a = (par.thrust * t - par.drag * y[1] * abs(y[1])) / y[2] - par.g
+            return [y[1], a, -par.burnt * t]
+    else:
+        system, y0, begins, y = MOTOR, [0.0, 0.0], par.friction / par.torque, [0.0, 0.0]
+
+        def ahead(t, y):
+            return [y[1], par.torque * t - par.friction - par.viscous * y[1]]
+
+    end = begins + rng.uniform(0.3, 2.0)
+    last = solve_ivp(ahead, (begins, end), y, method="DOP853", rtol=2.3e-14, atol=1e-15).y[:, -1]
+    values = {name: getattr(par, name) for name in system.parameters}
+    return Problem(system, y0=y0, t_end=end, parameters=values), last
+
+
+def check_starts(seeds):
+    for seed in seeds:
+        problem, expected = drawn_start(seed)
+        for method in METHODS:
+            found = integrate(problem, method, [problem.t_end])
+            assert found.status is Status.FINISHED, (seed, method, found.reason)
+            assert np.abs(found.y[-1] - expected).max() < 1e-11, (seed, method)  # measured 2.7e-13
+
+
+def test_rockets_and_motors_start():
+    check_starts(range(15))
+
+
+@pytest.mark.slow
+def test_so_do_hundreds_of_rockets_and_motors():
+    check_starts(range(100, 400))
 
 
 @pytest.mark.parametrize(

@@ -143,26 +143,29 @@ def try_length(ctx, length):
 
 
 @compiled
+def changes_sign(before, after):
+    """Whether a distance passes 0: one that is 0 before, as a height at rest, tells no place where it does."""
+    return before != 0.0 and (before > 0.0) != (after > 0.0)
+
+
+@compiled
 def first_crossing(ctx):
     """Return the part of the step after which a surface is crossed, from the distances at nodes.
 
-    Sets `Surfaces.row`, the row of the distance that vanishes there.
+    Sets `Surfaces.row`, the row of the distance that vanishes there; 0: none tells.
     """
     surfaces = ctx.surfaces
     j = surfaces.across
     before = j - 1 if j > 0 else first_point(ctx)
     low = 0.0 if before < 0 or before == j else ctx.tables.nodes[before]
     high = ctx.tables.nodes[j]
-    part, changes = high, 0
+    part, surfaces.row = high, 0
     for i in range(1, 1 + surfaces.count):
         a, b = value_at(ctx, i, before), value_at(ctx, i, j)
-        change = 1 if (a < 0.0) != (b < 0.0) else 0
-        if change < changes:
-            continue
-        crossing = low + (high - low) * abs(a) / (abs(a) + abs(b))
-        if change > changes or crossing <= part:
-            part, changes = crossing, change
-            surfaces.row = i
+        if changes_sign(a, b):
+            crossing = low + (high - low) * abs(a) / (abs(a) + abs(b))
+            if crossing <= part:
+                part, surfaces.row = crossing, i
     return part if part > low else 0.5 * (low + high)
 
 
@@ -178,7 +181,7 @@ def part_to_surface(ctx):
         earliest, row = INFINITY, 0
         for i in range(1, 1 + surfaces.count):
             a, b = value_at_node(ctx, i, ctx.k - 1), surfaces.ends[ctx.lanes * i + 1]
-            if (a < 0.0) != (b < 0.0) or (i == surfaces.row and surfaces.ends[1] != here):
+            if changes_sign(a, b) or (i == surfaces.row and surfaces.ends[1] != here):
                 part = abs(a) / (abs(a) + abs(b))
                 if part < earliest:
                     earliest, row = part, i
@@ -189,6 +192,8 @@ def part_to_surface(ctx):
     here = value_at(ctx, 0, first_point(ctx))
     before, at = ctx.tables.nodes[ctx.k - 1], 1.0
     value_before, value = distance_at(ctx, before, here), distance_at(ctx, at, here)
+    if value_before == 0.0:  # stages of a longer step were beyond this one: in fact it is 0 all along
+        return 0.0
     for _ in range(SECANTS):
         if value == 0.0:
             break
