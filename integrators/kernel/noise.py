@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from integrators.kernel.step.rounding import UNIT
 from integrators.kernel.step.rule import FLOOR, SMALLEST
 from integrators.protocol import Array, Status
 
@@ -17,7 +18,7 @@ LENGTHS = (2.0**-38, 2.0**-29, 2.0**-20, 2.0**-11, 2.0**-2)
 ALL_LENGTHS = (*LENGTHS, 1.0)
 GOLDEN = 0.618  # multiples of it, but for their integers, are in no order
 FLAT = 0.1  # coefficients of high degree that are at least this part of the middle ones do not fall off
-UNIT, BEYOND_ROUNDING = 2.0**-52, 100.0
+BEYOND_ROUNDING = 100.0
 MARGIN = 30.0  # times what noise adds while the state changes by its size is a tolerance that can be had
 MOST = 0.1  # a looser tolerance is no advice
 

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from problems.analysis.ranges import RANGES, Range
-from problems.analysis.sizes import size_in_time
+from problems.analysis.sizes import ROUNDING, size_in_time
 from problems.derive.forward import Slopes
 from problems.evaluate.evaluator import Evaluator
 from problems.graph.fold import Copy
@@ -15,7 +15,6 @@ Array = NDArray[np.float64]
 MOST = 1 << 16  # intervals that are looked at side by side
 SMALLEST = 2.0**-44  # of the largest time: no shorter interval is divided
 ITERATIONS = 200  # of a root finder that bisects where it must
-ROUNDING = 4 * 2.0**-52  # of a function's terms: the error of its value
 
 
 class TooMany(Exception):  # noqa: N818 -- no error: shorter intervals are to be looked at

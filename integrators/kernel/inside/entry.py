@@ -40,6 +40,7 @@ from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.parts.events import CHANGE
 from integrators.kernel.simd.lanes import two_sum
+from integrators.kernel.step.rounding import UNIT
 from integrators.kernel.step.sample import write
 from integrators.kernel.step.sums import time_of_step
 
@@ -48,7 +49,6 @@ ISOLATED = 16  # changes of sign in a part that is not resolved: a pole, a jump 
 NOISE_FACTOR = 4.0  # times the rounding of one state: what many steps leave of a g that vanishes all along
 SHORTEST = 1e-6  # of a step is more than a unit in the last place of time: else there is no point inside
 SAME = 1e-5  # of a step: a touch as close to another zero is none of its own
-ULP = 2.0**-52
 
 searching = view(Search)
 
@@ -208,7 +208,7 @@ def stretch(ctx, search, first, last):
     for d in range(search.dim):
         search.end_state[d] = state[d]
     size = max(abs(search.start), abs(search.end))
-    search.resolution = ULP * size / abs(search.end - search.start)
+    search.resolution = UNIT * size / abs(search.end - search.start)
 
 
 @compiled

@@ -13,6 +13,7 @@ from integrators.kernel.native.jit import compiled
 from integrators.kernel.parts.surfaces import AT_STEP_END
 from integrators.kernel.simd.memory import call_field
 from integrators.kernel.step.control import INFINITY
+from integrators.kernel.step.rounding import rounding_of
 
 NEAR, FAR = 2.0**-28, 2.0**-20  # of how far states move in a step: distances from the surface
 STAYS = 0.5  # of a speed at the larger distance is left at the smaller one, if it does not vanish
@@ -20,7 +21,7 @@ DIFFERENCE = 2.0**-18  # of the same: for derivatives of g
 SHORT = 2.0**-17  # of a step: for its second derivative
 RESOLVED = 2.0**-12  # of a state's component counts as a move of it
 REACH = 2.0**-4  # of a step: where the field tells how far states move that have no slope yet
-ROUNDING, CANCELLED = 2.0**-50, 2.0**-40  # of the sum of the terms of g, and of its derivative
+CANCELLED = 2.0**-40  # of the terms of dg/dt, from differences: what rounding may leave where they cancel
 BEYOND = 2.0  # times that sum a state is put beyond a surface
 NEAR_ABOVE, FAR_ABOVE, NEAR_BELOW, FAR_BELOW = range(4)
 
@@ -118,15 +119,15 @@ def slides_along(ctx, i, g):
     surfaces, lanes, rows, states, values = ctx.surfaces, ctx.lanes, ctx.rows, ctx.stages, ctx.values
     moves, gradient, h = surfaces.state, surfaces.state + ctx.padded, ctx.controller.next_length
     rate = set_gradient(ctx, i, g)
-    largest, square, rounding = 0.0, 0.0, 0.0
+    largest, square, terms = 0.0, 0.0, 0.0
     for d in range(rows):
         largest = max(largest, abs(moves[d] * gradient[d]))
-        rounding += ROUNDING * abs(gradient[d] * component(ctx, d))
+        terms += abs(gradient[d] * component(ctx, d))
     if not 0.0 < largest < INFINITY:
         return False
     for d in range(rows):
         square += (moves[d] * gradient[d] / largest) ** 2
-    size = square**0.5 * largest
+    size, rounding = square**0.5 * largest, rounding_of(terms)
     set_lanes(ctx, surfaces.times, ctx.t0, states)
     for d in range(rows):
         part = moves[d] * (moves[d] * gradient[d] / size)
@@ -150,7 +151,7 @@ def slides_along(ctx, i, g):
             arrival += gradient[d] * previous_end(ctx, d)
         beyond = 1.0 if arrival * ahead > 0.0 else -1.0
         if (above if beyond > 0.0 else below) == 0.0:
-            move = beyond * max(BEYOND * rounding, ROUNDING * size) - g
+            move = beyond * max(BEYOND * rounding, rounding_of(size)) - g
             for d in range(rows):
                 ctx.state[d] += move / size * (moves[d] * (moves[d] * gradient[d] / size))
     return above < 0.0 and below > 0.0

@@ -4,8 +4,8 @@ from integrators.kernel.inside.memory import FINE, FINEST, WHOLE
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.lanes import fma
 from integrators.kernel.simd.memory import call_field, get, put, splat8, spread
+from integrators.kernel.step.rounding import rounding_of
 
-ROUNDING = 4 * 2.0**-52
 NUDGE = 1e-6  # relative change of a component that shows how a function depends on it
 NAN = float("nan")
 
@@ -206,4 +206,4 @@ def noise_of(ctx, search, t, state):
             slope = abs(search.outputs[i] - value) / NUDGE
             total += slope if is_finite(slope) else 0.0
             search.block[8 * (first + i) + i] = state[first + i]
-    return ROUNDING * total
+    return rounding_of(total)

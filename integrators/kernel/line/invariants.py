@@ -24,11 +24,12 @@ identically 0 in the gradients, in the matrix and in its factors is left out: n 
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.memory import call_field, get, larger, largest, put, splat8, spread, total
 from integrators.kernel.step.fixed_point import multiply
+from integrators.kernel.step.rounding import rounding_of
 from integrators.kernel.step.stages import group_offset, offset
 
 DEPENDENT = 1e-10  # a pivot this small, relative to its row, is none
 REGULAR = 1e-6  # rounding is taken back along these directions only
-ROUNDING = 2.0**-46  # a larger gap in an invariant, relative to the largest terms so far, is not rounding
+OF_A_STEP = 16.0  # times the rounding of one value is that of a step, a sum over its stages
 GAIN = 0.125  # of a gap is taken back in a step: the noise of its evaluation averages out
 
 
@@ -199,7 +200,7 @@ def measure_gap(ctx):
             reference[a], gap = value, 0.0
         elif not active[a]:
             gap = 0.0
-        elif not abs(gap) <= ROUNDING * largest[a]:
+        elif not abs(gap) <= OF_A_STEP * rounding_of(largest[a]):
             if lost[a] == 0.0:
                 ctx.first_loss[a] = ctx.t0
             lost[a] += abs(gap)

@@ -1,10 +1,12 @@
-"""What rounding explains of the field: its noise, measured where nothing else is left of it.
+"""What rounding explains: of a value by the terms that it is a sum of, of the field by its noise.
 
-On a straight line that is a small enough part of a step, a smooth field is a polynomial of low degree but for
-less than rounding. Its Legendre coefficients of high degree are then noise, whatever the field's terms are
-and however they cancel (the idea of J. J. More and S. M. Wild, "Estimating computational noise", SIAM J. Sci.
-Comput. 33 (2011) 1292-1314, with coefficients in place of differences). A coefficient that noise explains is
-evidence of nothing: of no error, of no approach, of no discontinuity.
+Nothing below it is evidence: of no error, no approach, no discontinuity, no loss of an invariant, no zero.
+Values whose terms are known are those of invariants and of functions whose zeros are looked for. The terms of
+the field are not known, but its noise is measured where nothing else is left of it: on a straight line that
+is a small enough part of a step a smooth field is a polynomial of low degree but for less than rounding. Its
+Legendre coefficients of high degree are then noise, whatever the terms are and however they cancel (the idea
+of J. J. More and S. M. Wild, "Estimating computational noise", SIAM J. Sci. Comput. 33 (2011) 1292-1314, with
+coefficients in place of differences).
 """
 
 from math import copysign
@@ -18,6 +20,7 @@ from integrators.kernel.step.control import INFINITY
 from integrators.kernel.step.fixed_point import evaluate
 from integrators.kernel.step.rule import STAGNATION
 from integrators.kernel.step.stages import offset
+from problems.analysis.sizes import ROUNDING
 
 # Times the measured noise that a coefficient may be. That is the largest of four coefficients, on the less
 # noisy of two lines: of normally distributed ones smaller than a tenth of their deviation in one measurement
@@ -31,6 +34,12 @@ LEAST_WAY = 2.0**-46
 # Part of its size by which a component's stages are unlike those of any smooth line: they are rounded.
 UNIT = 2.0**-52
 GOLDEN = 0.618  # multiples of it, but for their integers, are in no order
+
+
+@compiled
+def rounding_of(terms):
+    """Return what rounding explains of a value, from the largest sum of its absolute terms so far."""
+    return ROUNDING * terms
 
 
 @compiled

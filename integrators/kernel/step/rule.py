@@ -48,7 +48,8 @@ FIRST_RATE = log2(0.01)  # contraction (binary logarithm) before any is measured
 
 FLOOR = 1e-3  # of the largest size in its group: where rounding of the field may hide a small component
 # Of the same, where steps vary: a smaller block is judged as if it had this size, as its errors are. A block
-# that is 0 at first grows by one power of t in each iteration, far from the others by many.
+# that is 0 at first grows by one power of t in each iteration, far from the others by many. It is a scale of
+# errors, far above rounding.
 LEAST_BLOCK = 1e-6
 SMALLEST, LARGE = 1e-280, 1e280  # a block smaller than that has no size to divide by, and counts as so large
 
