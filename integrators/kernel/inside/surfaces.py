@@ -144,7 +144,7 @@ def try_length(ctx, length):
 
 @compiled
 def changes_sign(before, after):
-    """Whether a distance passes 0: one that is 0 before, as a height at rest, tells no place where it does."""
+    """Whether a distance passes 0: one that is 0 before, as a height at rest, tells no place."""
     return before != 0.0 and (before > 0.0) != (after > 0.0)
 
 

@@ -41,7 +41,7 @@ from integrators.kernel.step.rule import FIRST_AT_REST, LEAST_BLOCK, RESTART, SM
 
 SLIGHT = 1e-3  # part of the error allowed that a discontinuity counts as where it is negligible
 NARROWEST = 1e-12  # part of the time: shorter steps do not look for a discontinuity any more
-# Times as much is negligible in such a step: next to a zero of a component none might be short enough. That is
+# Times as much is negligible in such a step: next to a zero of a component none might be short enough. It is
 # what the resolution of time leaves, not the rounding of a value.
 NARROW_STEP_FACTOR = 1e3
 # Times the last coefficients: a smooth field is no farther from its polynomial at the ends
