@@ -59,8 +59,8 @@ class TimingPlan(msgspec.Struct, frozen=True, kw_only=True):
         Fresh processes with empty caches among which the rounds are shared, for one compilation of a method
         may be slower than the next. Those that choose a setting do not compare it.
     front : bool
-        Whether a setting that the first compilation shows to be far behind another one of its method is not
-        timed again; see `hbvm_bench.run.front`.
+        Whether a setting that the first compilation shows to be far behind others is not timed again; see
+        `hbvm_bench.summaries.front`.
     """
 
     rounds: Annotated[int, Meta(ge=0, le=10_000)] = 3

@@ -311,5 +311,5 @@ def _time(campaign: Campaign, cases: list[Resolved], store: Store, live: Live) -
     if old := timing_pass.outdated(cases, store, campaign.timing):
         live.say(f"the plan of the timing has changed: {old} cases are timed again")
     live.phase("timing, problem by problem", visits, 0)
-    timing_pass.time_cases(cases, store, campaign.timing, campaign.limits, live.visit)
+    timing_pass.time_cases(cases, store, campaign.timing, campaign.limits, live.visit, campaign.asked())
     live.visited()

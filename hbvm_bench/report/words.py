@@ -6,6 +6,7 @@ from hbvm_bench.campaign.file import TimingPlan
 from hbvm_bench.measure.measured import POSITION
 from hbvm_bench.measure.metrics import GUARD_TOLERANCE
 from hbvm_bench.store.records import Record, Value
+from hbvm_bench.summaries import front
 from hbvm_bench.summaries.outcomes import disturbed
 from hbvm_bench.summaries.points import accurate, is_hbvm_or_gauss, number, short_name
 from hbvm_bench.summaries.rows import (
@@ -98,10 +99,7 @@ def timing(plan: TimingPlan) -> str:
     if plan.clock != "wall":
         visits += f" The seconds are CPU time of this {plan.clock}: waiting does not count."
     if plan.front:
-        visits += (
-            " A setting that in the first compilation takes more than twice the time of another one of its "
-            "method that is as accurate is not timed again."
-        )
+        visits += f" A setting is not timed again after the first compilation where {front.RULE}."
     sample = f"A sample lasts at least {seconds(plan.shortest)}."
     if plan.shortest < SHORTEST_RUN:
         sample = "A sample is one integration."

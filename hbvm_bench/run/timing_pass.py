@@ -1,21 +1,22 @@
 """The timing pass: one process takes the cases of a problem in turn, alone and without output."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime
 from statistics import median
+from types import MappingProxyType
 
 from msgspec.structs import replace
 
 from hbvm_bench.campaign import own
-from hbvm_bench.campaign.file import Limits, TimingPlan
+from hbvm_bench.campaign.file import Accuracy, Limits, TimingPlan
 from hbvm_bench.campaign.identity import Resolved
 from hbvm_bench.measure import machine, reading
 from hbvm_bench.measure.timing import shared
-from hbvm_bench.run import front
 from hbvm_bench.run.task import NO_RESULT, Request, timed
 from hbvm_bench.store.records import Record, Timing
 from hbvm_bench.store.store import Store
+from hbvm_bench.summaries import front
 
 Machine = dict[str, str | int]
 Group = list[tuple[Resolved, Record]]
@@ -28,6 +29,7 @@ def time_cases(
     plan: TimingPlan,
     limits: Limits,
     tell: Callable[[Resolved], None] = lambda resolved: None,
+    asked: Mapping[str, Sequence[Accuracy]] = MappingProxyType({}),
 ) -> None:
     """Take what is missing of the timing pass, problem by problem.
 
@@ -43,6 +45,8 @@ def time_cases(
         Of each visit, times the number of its cases.
     tell : callable, optional
         Called before each visit with the first case.
+    asked : mapping, optional
+        The errors that are asked for by problem; see `hbvm_bench.summaries.front`.
 
     Raises
     ------
@@ -54,7 +58,8 @@ def time_cases(
         for group in _missing(cases, store, plan, here):
             tell(group[0][0])
             read = [reading.up_to_date(store, row) for _, row in group]
-            timings = _together(group, read, plan, limits, core)
+            errors = asked.get(group[0][0].case.problem, ())
+            timings = _together(group, read, plan, limits, core, errors)
             process = datetime.now(UTC).isoformat()
             taken = [replace(timing, plan=plan, machine=here, process=process) for timing in timings]
             store.renew([replace(row, timing=t) for (_, row), t in zip(group, taken, strict=True)])
@@ -100,7 +105,12 @@ def _is_timed(group: Sequence[Record], plan: TimingPlan, here: Machine) -> bool:
 
 
 def _together(
-    group: Group, records: Sequence[Record], plan: TimingPlan, limits: Limits, core: int | None
+    group: Group,
+    records: Sequence[Record],
+    plan: TimingPlan,
+    limits: Limits,
+    core: int | None,
+    asked: Sequence[Accuracy],
 ) -> list[Timing]:
     """Time the cases of a problem in turn, but for those on another trajectory."""
     pairs = zip((case for case, _ in group), records, strict=True)
@@ -128,7 +138,7 @@ def _together(
         for (case, _), part in zip(going, parts, strict=True):
             taken[case.id].append(part)
         if plan.front and not place:
-            left = front.behind([case for case, _ in on], [record for _, record in on], parts)
+            left = front.behind([record for _, record in on], parts, asked)
             for (case, _), is_behind in zip(on, left, strict=True):
                 if is_behind:
                     taken[case.id].append(Timing(why=front.WHY))
