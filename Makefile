@@ -11,6 +11,7 @@ RESULTS := speed/race speed/automatic speed/work-precision conservation/endure c
 OWN := chaos random costs
 REPORTS ?= $(RESULTS)
 STUDIES ?= $(OWN)
+OPTIONS ?=  # of each run, as in OPTIONS=--quick
 
 .PHONY: bench evidence examples pages reports test test-all test-aarch64 docs lint format venv lock clean
 
@@ -21,9 +22,13 @@ examples: venv  ## the fourteen tasks beside other libraries: writes examples/me
 	$(BIN)/python examples/run_all.py
 
 reports: venv  ## write the results REPORTS="speed/race paper/sitnikov" from runs/, and every page; what is missing there runs
-	for place in $(REPORTS); do $(BIN)/hbvm-bench run $${place##*/} --report reports/$$place || exit 1; done
-	for name in $(STUDIES); do $(BIN)/hbvm-bench run reports/$$name --report reports/$$name || exit 1; done
-	$(MAKE) pages
+	@failed=; for place in $(REPORTS) $(STUDIES); do \
+	  case " $(OWN) " in *" $$place "*) study=reports/$$place;; *) study=$${place##*/};; esac; \
+	  echo "$$(date +%H:%M) $$place"; \
+	  $(BIN)/hbvm-bench run $$study $(OPTIONS) --report reports/$$place || { \
+	    [ $$? -eq 130 ] && exit 130; failed="$$failed $$place"; }; \
+	done; \
+	$(MAKE) --no-print-directory pages && date +%H:%M && { [ -z "$$failed" ] || { echo "not whole:$$failed"; exit 1; }; }
 
 evidence: venv  ## every study and its page, with one version of the code on a quiet machine; goes on where it was stopped
 	$(BIN)/hbvm-bench doctor

@@ -11,8 +11,8 @@ from hbvm_bench.summaries.points import accurate, family_of, number
 ERRORS = ("energy_max", "position_end")
 FACTOR = 2.0
 RULE = (
-    f"at every error that it reaches it takes more than {FACTOR:g} times as long as another setting, and at those "
-    "that the problem or a goal asks for as another one of its method"
+    f"at every error that it reaches it takes more than {FACTOR:g} times as long as another setting, and at "
+    "those that the problem or a goal asks for as another one of its method"
 )
 WHY = f"timed in the first compilation alone: {RULE}"
 

@@ -37,6 +37,7 @@ from .trials import (
     trial,
 )
 
+RUN = range(0, COUNT, DRAWS)  # problems of a run: one of each formula; 200 take forty minutes of two cores
 QUICK = (0, 52)  # problems of a quick run, and its methods
 QUICK_METHODS = ("HBVM()", "Taylor(tol=1e-10)", "DOP853(rtol=1e-10, atol=1e-06)")
 FACTORS = (10.0, 100.0, 1000.0)
@@ -44,9 +45,8 @@ UNANSWERED = (NO_ANSWER, CRASHED)
 Judge = Callable[[Outcome, Trial], float]
 
 
-def parts(*, quick: bool) -> list[Part]:
-    """Return what is computed and shown, in a quick run or a whole one."""
-    numbers, methods = (QUICK, QUICK_METHODS) if quick else (range(COUNT), METHODS)
+def parts(numbers: Sequence[int], methods: Sequence[str]) -> list[Part]:
+    """Return what is computed and shown of these problems and settings."""
     references = [
         Task(f"{number} reference", partial(reference, number), cost=2.0, limit=LIMIT) for number in numbers
     ]
@@ -75,16 +75,21 @@ def outcome_of(results: PartResults, number: int, methods: Sequence[str]) -> Out
 
 def tasks(quick: bool) -> list[Task]:
     """Return the computations of a quick run, or of a whole one."""
-    return tasks_of(parts(quick=quick))
+    return tasks_of(parts(QUICK, QUICK_METHODS) if quick else parts(RUN, METHODS))
 
 
 def outcomes(run: Results) -> list[Outcome]:
-    """Return what is stored of all problems."""
-    quick = run.runs[-1].index.campaign.quick
-    (part,) = parts(quick=quick)
+    """Return what is stored of all problems that were run."""
+    methods = QUICK_METHODS if run.runs[-1].index.campaign.quick else METHODS
+    (part,) = parts(range(COUNT), methods)
     results = PartResults(part, run)
-    numbers, methods = (QUICK, QUICK_METHODS) if quick else (range(COUNT), METHODS)
-    return [outcome_of(results, number, methods) for number in numbers]
+    there = [number for number in range(COUNT) if results.outcome(f"{number} reference")]
+    return [outcome_of(results, number, methods) for number in there]
+
+
+def problems_run(run: Results) -> int:
+    """Return of how many problems there are results."""
+    return len(outcomes(run))
 
 
 def positions(run: Results) -> list[Block]:
@@ -101,7 +106,7 @@ def details(run: Results) -> list[Block]:
         endings(found),
         families(found),
         left_out(found),
-        Note(HOW),
+        Note(f"{len(found)} problems {HOW}"),
     ]
 
 
@@ -320,14 +325,14 @@ ENERGY = (
     "sum of |∂H/∂y y| over the components, so that a constant added to H changes nothing."
 )
 HOW = (
-    f"{COUNT} problems of {len(FAMILIES)} families, drawn from the seed {SEED}: "
-    "`problem(number)` in `reports/random/systems.py` returns each. Five problems in a row "
+    f"of {len(FAMILIES)} families, drawn from the seed {SEED}: "
+    "`problem(number)` in `reports/random/systems.py` returns each. Five numbers in a row "
     "have one formula and their own coefficients, initial state and interval; the intervals of shares "
-    "take all as "
-    f"independent. Every method is asked for {TOLERANCE:g}; `HBVM()`, `Taylor()` and `IAS15` choose their "
-    "accuracy themselves and are judged by the same. `atol=1e-06` is SciPy's default. Radau, which takes "
-    f"seconds, has {SLOW_DRAWS} of the {DRAWS} problems of each formula. References: two computations in "
-    "113-bit and double-double arithmetic that agree to 1e-16. Condition number: how far the end moves when "
-    "the state at the worst time is changed by a small part of itself (`hbvm_bench.reference.condition`). "
+    f"take all as independent. Every method is asked for {TOLERANCE:g}; `HBVM()`, `Taylor()` and `IAS15` "
+    "choose their accuracy themselves and are judged by the same. `atol=1e-06` is SciPy's default. Radau, "
+    f"which takes seconds, has the first {SLOW_DRAWS} of the {DRAWS} of each formula. References: two "
+    "computations in 113-bit and double-double arithmetic that agree to 1e-16. Condition number: how far the "
+    "end moves when the state at the worst time is changed by a small part of itself "
+    "(`hbvm_bench.reference.condition`). "
     "Where it is above 1e7, positions are not judged."
 )

@@ -100,7 +100,7 @@ def test_a_process_without_an_answer_is_a_trial_that_says_so():
 
     names = [task.key for task in report.tasks(quick=True)]
     ended = {name: row("timeout" if name.endswith("HBVM()") else "crashed") for name in names}
-    (part,) = report.parts(quick=True)
+    (part,) = report.parts(report.QUICK, report.QUICK_METHODS)
     results = PartResults(part, Results([], [], {}, computed=ended))
     outcome = report.outcome_of(results, 52, report.QUICK_METHODS)
     assert [made.status for made in outcome.trials] == [trials.NO_ANSWER, trials.CRASHED, trials.CRASHED]
