@@ -18,6 +18,7 @@ LIMITS = {
     "COMPONENTS": (200_000, "components of the state"),  # 3 s to build and 1 s to compile as a loop
     "TERMS": (2_000_000, "terms in one m.sum"),  # 1 s to read them
     "OPERATIONS": (10_000, "operations written out"),  # about a minute to compile
+    "UNROLLED": (200_000, "operations with all loops written out"),  # 2 s to write them
     "DEPTH": (1_000, "operations that wait for one another"),  # the same: all their values are kept
     "STAGES": (256, "stages"),  # 7 s for the coefficients, 20 s for twice as many
     "SAMPLES": (10_000_000, "samples"),

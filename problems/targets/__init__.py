@@ -30,11 +30,12 @@ from problems.targets import cache
 from problems.targets.array_text import jax_text, numpy_text
 from problems.targets.heyoka_text import heyoka_text
 from problems.targets.numba_text import numba_text
-from problems.targets.plan import SMALL, make_plan
+from problems.targets.plan import SMALL, make_plan, unrolled
 
 _WRITERS = {"numpy": numpy_text, "numba": numba_text, "jax": jax_text, "heyoka": heyoka_text}
 BACKENDS = tuple(_WRITERS)
 LONG, PER_SECOND = 3000, 600  # operations of a field of which its writer is told; compiled in a second, about
+_LOOPS = "take a method that compiles loops, as HBVM, Gauss and those of SciPy do"
 _CALLED = sorted({f.numba.partition("(")[0] for f in FUNCTIONS.values()} - {""})
 _ARRAYS = [name for name in _CALLED if name == "floor" or not hasattr(math, name)]  # math.floor is an integer
 _MATHEMATICS = {name: getattr(np if name in _ARRAYS else math, name) for name in _CALLED}
@@ -101,7 +102,8 @@ def source(system: System, quantity: Quantity, backend: str, *, limit: int | Non
     Raises
     ------
     problems.errors.InputError
-        For an unknown backend, or a function that the system does not have.
+        For an unknown backend, a function that the system does not have, or more operations than
+        `problems.limits` allow where all loops are written out.
     """
     if backend not in _WRITERS:
         raise unknown("backend", backend, BACKENDS)
@@ -128,6 +130,8 @@ def _function(system: System, quantity: Quantity) -> Function:
 
 
 def _written(function: Function, name: str, backend: str, limit: int | None) -> Source:
+    if limit is None:
+        limits.check(f"the {function.name} for {backend}", "UNROLLED", unrolled(function), _LOOPS)
     plan = make_plan(function, limit=limit)
     text = _WRITERS[backend](plan, name)
     return Source(text, name, hashlib.sha256(text.encode()).hexdigest(), plan.cost)

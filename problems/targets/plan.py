@@ -263,6 +263,12 @@ def _added(chain: list[Node], graph: Graph) -> Node:
     return sum(chain[1:], chain[0]) if chain else graph.const(0.0)
 
 
+def unrolled(function: Function) -> int:
+    """Return how many operations a function is where all loops are written out."""
+    added = sum(len(loop) * len(entries) for loop, entries in function.loops)
+    return _size(reachable(function.roots)) + added + sum(map(len, function.outputs))
+
+
 def _size(nodes: Sequence[Node]) -> int:
     """Return how many operations nodes are where all loops are written out."""
     total = 0
