@@ -234,6 +234,23 @@ def test_loops_are_unrolled_for_heyoka(case):
     assert len(targets.heyoka(case.system)) == case.system.dim
 
 
+def test_a_huge_text_for_heyoka_is_refused_before_it_is_written():
+    n = 1000
+    system = VectorField(
+        lambda y, m: m.each(lambda i: m.sum(lambda j: y[j] - y[i], range(n)), range(n)), dim=n
+    )
+    begun = time.process_time()
+    with pytest.raises(InputError, match=r"heyoka has 4,002,000 operations with all loops written out"):
+        targets.source(system, "field", "heyoka")
+    assert time.process_time() - begun < 2.0  # measured 0.01
+
+
+def test_slices_of_a_large_state_are_no_operations():
+    n = 20_000
+    system = VectorField(lambda y, m: [m.each(lambda i: -y[:n][i], range(n)), *[0.0] * n], dim=2 * n)
+    assert targets.source(system, "field", "numba").cost < 2 * n + 100
+
+
 def test_loops_run_in_jax(case, y):
     pytest.importorskip("jax")
     value = targets.jax(case.system, "field", limit=0)(0.0, y, case.system.pack())

@@ -123,6 +123,18 @@ def test_a_run_has_the_digits_of_integrate():
     assert not run.pairs[:, 1].any()
 
 
+def test_a_choice_is_one_of_its_parts_in_all_digits():
+    def chosen(y, m):
+        return [y[1], -m.where(y[0] > -2.0, m.sin(y[0]), y[0] ** 3)]
+
+    fields = (chosen, lambda y, m: [y[1], -m.sin(y[0])])
+    runs = [
+        integrate(Problem(VectorField(f, dim=2), y0=[1.0, 0.3], t_end=4.0), method(), [1.0, 4.0])
+        for f in fields
+    ]
+    assert (runs[0].to_mpmath() == runs[1].to_mpmath()).all()
+
+
 def test_the_digits_of_a_run_are_those_at_the_double_that_is_its_time():
     """Three steps of the double next to 0.1 end 2.8e-17 before the double that is its time."""
     run = start(KEPLER, method(h=0.1))
