@@ -20,7 +20,6 @@ from hbvm_bench.report.page import Results
 from hbvm_bench.report.parts import Part, PartResults
 from hbvm_bench.run import computing, executors
 from hbvm_bench.store.store import FILE, PACKED, Store
-from hbvm_bench.studies.paper.experiments import others
 from hbvm_bench.studies.paper.experiments.departure import departure
 from hbvm_bench.studies.paper.henon_heiles_part import fates
 from integrators.methods.gauss import Gauss
@@ -202,16 +201,3 @@ def test_a_report_is_written_whole_drawn_again_and_loses_little_where_a_result_i
     text = (tmp_path / "again" / "report.md").read_text(encoding="utf-8")
     assert "**Not made: the order**" in text
     assert "Conservation from k ≥ νs/2" in text
-
-
-def test_a_library_that_refuses_is_a_row_with_its_reason():
-    pytest.importorskip("rebound")
-    row = others.measured("period-annulus", "WHFast(h=0.02)")
-    assert not row.numbers
-    assert "bodies" in row.remark
-
-
-def test_heyoka_finds_the_same_edge():
-    pytest.importorskip("heyoka")
-    row = others.measured("period-annulus", "Taylor(tol=1e-15, high_accuracy=True, compact_mode=True)")
-    assert row.numbers["error"] < 2e-15  # 4.6e-16

@@ -22,7 +22,6 @@ from integrators.protocol import Array
 from problems.catalogue.henon_heiles import ESCAPE, SADDLES
 
 from .experiments import henon_heiles as experiment
-from .experiments import others
 from .experiments.henon_heiles import GAP, GAPS, NEIGHBOURS, T_END, H, Orbit, StepRow
 
 METHODS = {"gauss": experiment.GAUSS, "hbvm": experiment.HBVM_4}
@@ -44,7 +43,6 @@ def _runs() -> list[Task]:
         Task("hbvm", partial(experiment.orbit, METHODS["hbvm"]), 3),
         Task("truth", experiment.true_orbit),
         *each("steps", experiment.by_step, METHODS, 9),
-        *each("other", partial(others.measured, "henon-heiles"), others.HENON_HEILES, 8),
     ]
     for family, method in METHODS.items():
         runs += split(f"escapes {family}", partial(experiment.escapes, method), range(NEIGHBOURS), 4, 6)
@@ -62,7 +60,6 @@ def _blocks(results: PartResults) -> list[Maker]:
         ("the escape times", lambda: fates(results.each("escapes", METHODS))),
         ("which initial conditions escape", lambda: maps(_maps(results))),
         ("step sizes", lambda: _step_table(results.each("steps", METHODS))),
-        ("other integrators", lambda: _others(results)),
     ]
 
 
@@ -165,23 +162,6 @@ def _step_table(steps: Mapping[str, Sequence[StepRow]]) -> Table:
         words=(),
         key="henon-heiles-steps",
         groups=(("", 1), ("Gauss, s = 2", 3), ("HBVM(4,2)", 3)),
-    )
-
-
-def _others(results: PartResults) -> Table:
-    return others.table(
-        "henon-heiles-others",
-        results.each("other", others.HENON_HEILES),
-        {
-            "energy": ("energy", number),
-            "outside by": ("outside", number),
-            "agrees until t": ("agrees", "{:.0f}".format),
-        },
-        "The same initial condition with other integrators",
-        f"To t = {others.HENON_SPAN:g}. Largest relative energy error; largest distance beyond the "
-        f"triangle; time at which the orbit is {experiment.AGREES:g} from that of HBVM(15,10), h = 1/4. "
-        "Chaos doubles every error about every five units of time, so no double precision orbit agrees "
-        "much longer than two hundred.",
     )
 
 

@@ -19,7 +19,6 @@ from integrators.methods.hbvm import HBVM
 from integrators.protocol import Array, MethodBase
 from problems.catalogue.period_annulus import C_STAR, H_STAR, P1, P2
 
-from .experiments import others
 from .experiments import period_annulus as experiment
 from .experiments.period_annulus import (
     DRAWN,
@@ -66,7 +65,6 @@ def _runs() -> list[Task]:
         *each("fates", partial(experiment.fates, gaps=FATE_GAPS), FATE_METHODS, 5),
         Task("drawn", experiment.drawn, 3),
         Task("periods", partial(experiment.periods, PERIOD_GAPS), 2),
-        *each("other", partial(others.measured, "period-annulus"), others.PERIOD_ANNULUS, 8),
     ]
 
 
@@ -86,7 +84,6 @@ def _blocks(results: PartResults) -> list[Maker]:
             "the fates near the edge",
             lambda: fates(results.each("fates", FATE_METHODS)),
         ),
-        ("the other integrators", lambda: _others(results)),
     ]
 
 
@@ -222,16 +219,6 @@ def _spread_table(spreads: Mapping[Key, Sequence[float]]) -> Table:
         words=(),
         key="table-1-spread",
         groups=(("", 2), ("error in H", 1), (f"here, {len(experiment.ENDS)} bisections", 4), ("", 1)),
-    )
-
-
-def _others(results: PartResults) -> Table:
-    return others.table(
-        "period-annulus-others",
-        results.each("other", others.PERIOD_ANNULUS),
-        {"c": ("c", POINT), "error in H": ("error", partial(number, digits=3))},
-        "The same bisection with other integrators",
-        f"Judged over an interval of {experiment.SHORT_SPAN:g}; c* = {C_STAR!r}.",
     )
 
 

@@ -1,4 +1,4 @@
-"""Pictures of Sitnikov's problem that the paper does not have: nodes, steps, truth, chaos."""
+"""Pictures of Sitnikov's problem behind claims of the paper: nodes, steps, chaos."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -10,12 +10,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from hbvm_bench.report.figures.canvas import log_axis, say
-from hbvm_bench.report.figures.drawn import COLOURS, WIDTH, Said, drawn, heat, number
+from hbvm_bench.report.figures.drawn import COLOURS, WIDTH, Said, drawn, number
 from hbvm_bench.report.figures.style import INK, MUTED, PAPER, TRUTH
 from hbvm_bench.summaries.table import Table
 from integrators.protocol import Array
 
-from .experiments import axis_motion
 from .experiments.axis_motion import START, Growth
 from .experiments.sitnikov import DEGREE, T_END, E, StepRow
 
@@ -155,24 +154,6 @@ def _cells(row: StepRow) -> tuple[str, ...]:
     return (fate, number(row.energy), *rates)
 
 
-@drawn("sitnikov-truth", "Beyond the paper · position error", WIDTH, 3.4)
-def truth_compared(figure: Figure, runs: Sequence[tuple[str, str, Array, Array]]) -> Said:
-    """Draw |z - true z| over time for several runs: (label, family, t, error)."""
-    axes = figure.subplots()
-    unused = {family: iter(("-", (0, (6, 2)), (0, (2, 1.6)), (0, (8, 2, 2, 2)))) for family in COLOURS}
-    for label, family, t, error in runs:
-        look = {"color": COLOURS[family], "linestyle": next(unused[family]), "linewidth": 1.2}
-        axes.plot(t[1:], np.maximum(error[1:], 1e-16), label=label, marker="o", markersize=2.5, **look)
-    log_axis(axes, "y", -13, 1, most=7)
-    axes.set(xlim=(0, T_END), xlabel="time", ylabel="|z − reference z|")
-    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
-    return (
-        "A small energy error does not imply a small position error: all HBVM runs here conserve the energy "
-        "to 1e-13. The error of the height at the times of the stored 128-bit reference.",
-        "; ".join(f"{label}: {error[-1]:.2e} at the end" for label, _, _, error in runs),
-    )
-
-
 @drawn("sitnikov-chaos", "Beyond the paper · chaotic or regular", WIDTH, 4.4)
 def chaos(
     figure: Figure, rows: Sequence[Growth], points: Sequence[tuple[float, Array]], critical: float
@@ -213,34 +194,4 @@ def chaos(
         "planetoid neglected.",
         f"At e = {at.e:g}: along the axis {along}; off the axis {at.across:.3f}, a factor e every "
         f"{1 / at.across:.2f} units of time.",
-    )
-
-
-@drawn(
-    "sitnikov-territory",
-    "Beyond the paper · planetoids that stay on the axis",
-    WIDTH * 0.72,
-    4.0,
-    values=True,
-)
-def territory(figure: Figure, left_after: Array) -> Said:
-    """Where planetoids stay: revolutions until they leave, over eccentricity and speed."""
-    es, speeds, turns = axis_motion.MAP_ECCENTRICITIES, axis_motion.MAP_SPEEDS, axis_motion.MAP_TURNS
-    axes = figure.subplots()
-    mesh = heat(axes, es, speeds, left_after.T, 0, math.log10(turns))
-    bar = figure.colorbar(mesh, ax=axes, pad=0.02, aspect=30)
-    ticks = [value for value in (1, 3, 10, 30, 100, 300) if value <= turns]
-    bar.set_ticks([math.log10(value) for value in ticks], labels=[str(value) for value in ticks])
-    bar.set_label(f"revolutions until |z| > 100; blank: stays for {turns}")
-    axes.plot(E, START[1], "o", color=COLOURS["motion"], markersize=8, mec=PAPER, mew=1.5, zorder=5)
-    say(axes, "the paper's run", (E, START[1]), (-9, -3), ha="right", fontsize=8.5, color=INK)
-    axes.set(xlabel="eccentricity e", ylabel="speed through the plane at apocentre")
-    nearest = int(np.argmin(np.abs(np.asarray(es) - E)))
-    gone = np.flatnonzero(~np.isnan(left_after[nearest]))
-    edge = speeds[gone[0]] if gone.size else math.nan
-    return (
-        "For each eccentricity of the primaries and each speed at the start: how long the planetoid stays, "
-        "with its motion confined to the axis exactly. The edge of the blank region is the "
-        "end of regular motion; the paper's run lies inside it.",
-        f"At e = {es[nearest]:g} the slowest planetoid that leaves has speed {edge:.3g}.",
     )

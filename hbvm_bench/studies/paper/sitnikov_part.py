@@ -12,14 +12,11 @@ from hbvm_bench.report.figures.canvas import Picture
 from hbvm_bench.report.figures.drawn import number
 from hbvm_bench.report.page import Results
 from hbvm_bench.report.parts import Part, PartResults
-from hbvm_bench.store.records import Record, Value
-from hbvm_bench.summaries.rows import group_of, status_of
-from hbvm_bench.summaries.table import Table
 from integrators.protocol import Array
 
 from . import sitnikov_beyond as beyond
 from . import sitnikov_figures as figures
-from .experiments import axis_motion, others, sitnikov
+from .experiments import axis_motion, sitnikov
 from .experiments.axis_motion import Growth
 from .experiments.sitnikov import Orbit, StepRow
 
@@ -30,8 +27,6 @@ PROBLEM = (
     "and escape, so it is read as a speed."
 )
 NODE_STEPS = (0.5, 0.25)
-BLOWN = 1e3  # relative error of H of a run that has no meaning
-# Limits of the verdicts, each with what was measured.
 ALIKE = 0.05  # of the amplitude: two motions that differ by less look the same in a figure; 0.30
 IN_BOUNDS = 1.02  # of the true amplitude; 1.003
 ROUND_OFF = 1e-12  # Gauss's angular momentum 1.9e-15; the primaries' plane 3.7e-3, reference 3.8e-3
@@ -52,10 +47,8 @@ def _runs() -> list[Task]:
         *each("nodes", sitnikov.energy_by_nodes, NODE_STEPS, 3),
         Task("steps 2", partial(sitnikov.by_step, 2), 4),
         Task("steps 3", partial(sitnikov.by_step, 3, sitnikov.STEPS_SHORT), 4),
-        Task("truth", sitnikov.against_truth, 2),
         *split("growth", axis_motion.growth_by_eccentricity, axis_motion.ECCENTRICITIES, 3, 15),
         Task("section", partial(axis_motion.section, sitnikov.E), 4),
-        *split("stays", axis_motion.stays, axis_motion.MAP_ECCENTRICITIES, 4, 8),
     ]
 
 
@@ -74,11 +67,8 @@ def _blocks(results: PartResults) -> list[Maker]:
         ("nodes", lambda: beyond.by_nodes(results.each("nodes", NODE_STEPS))),
         ("steps", lambda: beyond.by_step(_steps(results))),
         ("step sizes", lambda: beyond.step_table(_steps(results))),
-        ("position error", lambda: beyond.truth_compared(results["truth"])),
         ("errors of HBVM(18,2)", lambda: _plainly(results)),
         ("chaotic or regular", lambda: beyond.chaos(results["growth"], results["section"], CRITICAL)),
-        ("planetoids that stay", lambda: beyond.territory(np.stack(results["stays"]))),
-        ("other integrators", lambda: _others(results)),
     ]
 
 
@@ -284,48 +274,8 @@ def _plainly(results: PartResults) -> str:
         "to the exact one. The method is not symplectic either. A higher order with a smaller step gets "
         "all "
         f"of it right: HBVM(16,8) with h = 1/8 has z at t = 1500 to {off}, for {share:.2f} "
-        "times the right-hand-side evaluations of the paper's run (table of the libraries below)."
+        "times the right-hand-side evaluations of the paper's run."
     )
-
-
-METRICS = ("energy_max", "angular_momentum_max", "guard_max", "observable_error", "evaluations")
-
-
-def _others(results: PartResults) -> Table:
-    return others.table(
-        "sitnikov-others",
-        {text: _row(record) for text, record in results.records.items()},
-        {
-            "energy": ("energy_max", number),
-            "angular momentum": ("angular_momentum_max", number),
-            "off the axis": ("guard_max", number),
-            "z at 1500 off by": ("observable_error", number),
-            "evaluations": ("evaluations", "{:,.0f}".format),
-        },
-        "The same run with other integrators",
-        "One setting per method, chosen for accuracy by the authors of this bench. Evaluations: of the "
-        "vector field, where the library counts them. `hbvm-bench run sitnikov` has all settings, with "
-        "times. A run that leaves the axis follows another trajectory, and its other numbers mean nothing.",
-    )
-
-
-def _row(record: Record) -> others.MethodRow:
-    if group_of(record) == "ended":
-        refused = record.result.outcome == "refused"
-        return others.MethodRow(
-            record.case.method, {}, record.result.reason if refused else status_of(record)
-        )
-    pairs = ((name, record.result.metrics.get(name, Value()).value) for name in METRICS)
-    numbers = {name: value for name, value in pairs if value is not None}
-    return others.MethodRow(record.case.method, numbers, _remark(numbers))
-
-
-def _remark(numbers: Mapping[str, float]) -> str:
-    if numbers.get("energy_max", 0.0) > BLOWN:
-        return "blows up"
-    if numbers.get("guard_max", 0.0) > 1e-6:
-        return "leaves the axis through asymmetric rounding"
-    return "loses the planetoid" if numbers.get("observable_error", 0.0) > sitnikov.LOST else ""
 
 
 PART = Part("sitnikov", "Sitnikov's problem", _runs(), _claims, _blocks)

@@ -36,9 +36,6 @@ FAR = 100.0  # |z| of a planetoid that is not coming back soon
 TURNS = (70, 1000)  # the paper's span, and a long one
 ECCENTRICITIES = (*np.round(np.linspace(0.0, 0.8, 17), 3).tolist(), 0.82, 0.84, 0.86, 0.87, 0.88, 0.89, 0.9)
 SECTION_SPEEDS = (0.5, *np.round(np.linspace(0.06, 1.32, 43), 3).tolist())
-MAP_ECCENTRICITIES = tuple(np.round(np.linspace(0.0, 0.9, 31), 4).tolist())
-MAP_SPEEDS = tuple(np.round(np.linspace(0.05, 1.4, 28), 4).tolist())
-MAP_TURNS = 100
 
 
 @dataclass(frozen=True)
@@ -130,9 +127,7 @@ def section(
     return [(start[1], np.vstack([start, _every_turn(AXIS, e, start, turns)[0]])) for start in starts]
 
 
-def stays(
-    es: Sequence[float] = MAP_ECCENTRICITIES, speeds: Sequence[float] = MAP_SPEEDS, turns: int = MAP_TURNS
-) -> Array:
+def stays(es: Sequence[float], speeds: Sequence[float], turns: int) -> Array:
     """Return after how many revolutions planetoids have gone far away, (len(es), len(speeds)); NaN: never."""
     rows = [[_every_turn(AXIS, e, (START[0], speed), turns)[1] for speed in speeds] for e in es]
     return np.array(rows, dtype=float)

@@ -7,13 +7,11 @@ from typing import Any
 import numpy as np
 
 import problems
-from hbvm_bench.reference import solutions
 from integrators import Solution, integrate, registry
 from integrators.methods.gauss import Gauss
 from integrators.methods.hbvm import HBVM
 from integrators.protocol import Array, MethodBase
 from problems import Problem
-from problems.errors import InputError
 
 from .departure import departure, first
 
@@ -201,21 +199,6 @@ def radial_period(solution: Solution) -> float:
         return float("nan")
     peaks = t[i] + 0.5 * (t[1] - t[0]) * (before - after) / (before - 2 * at + after)
     return float((peaks[-1] - peaks[0]) / (i.size - 1))
-
-
-def against_truth() -> list[tuple[str, str, Array, Array]]:
-    """Return label, family, times and |z - true z| of several runs, at the times of the 128-bit reference."""
-    start = problem()
-    known = solutions.find(start)
-    if known is None:
-        raise InputError(
-            "the stored reference of sitnikov() is missing: run hbvm-bench reference 'sitnikov()'."
-        )
-    runs = [(label, integrate(start, method, times=known.t)) for label, method in TRIALS]
-    return [
-        (label, run.method.family, run.t, np.abs(run.y[:, 8] - known.high[: run.t.size, 8]))
-        for label, run in runs
-    ]
 
 
 def _run(method: MethodBase) -> Solution:
