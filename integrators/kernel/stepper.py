@@ -172,7 +172,7 @@ class HBVMStepper(ABC):
         "blocks.floored_weights", "discontinuities.records", "discontinuities.boundary_values",
         "discontinuities.previous_boundary_values", "discontinuities.last_coefficients",
         "discontinuities.previous_last_coefficients", "previous.state", "previous.error", "estimate.expected",
-        "estimate.largest", "estimate.noise",
+        "estimate.largest", "estimate.noise", "blocks.terms",
     )  # fmt: skip
     error: Exception | None = None
     """What a function of the user raised, where the status is ``USER_ERROR``."""

@@ -88,6 +88,8 @@ class System:
         Invariants that are conserved on a manifold only, such as where constraints hold.
     derived : frozenset of str
         Invariants that follow from how the field is derived, and need no check.
+    independent : frozenset of str
+        Invariants whose components have linearly independent gradients wherever a problem may start.
     guards : mapping of str to Function
         Quantities that are exactly 0 by a symmetry.
 
@@ -105,6 +107,7 @@ class System:
     traced: ClassVar[bool] = True
     on_manifold: ClassVar[frozenset[str]] = frozenset()
     derived: ClassVar[frozenset[str]] = frozenset()
+    independent: ClassVar[frozenset[str]] = frozenset()
 
     def __init__(
         self,

@@ -96,7 +96,8 @@ class Constrained(System):
 
     kind = "vector_field"
     on_manifold: ClassVar[frozenset[str]] = frozenset({"energy", "constraints"})
-    derived: ClassVar[frozenset[str]] = on_manifold | {"constraint_rates"}
+    independent: ClassVar[frozenset[str]] = frozenset({"constraints", "constraint_rates"})
+    derived: ClassVar[frozenset[str]] = on_manifold | independent
 
     @checked_arguments
     def __init__(

@@ -1,7 +1,7 @@
 """The memory of a trajectory along which a line integral is kept: a `Context` and what it needs besides."""
 
 from integrators.kernel.context import Context
-from integrators.kernel.native.memory import Array, Integer, Pointer, Real, Table
+from integrators.kernel.native.memory import Array, Integer, Pointer, Real
 
 # Whose line integrals vanish: those of several invariants, or that of a Poisson system's energy.
 INVARIANTS, POISSON = range(2)
@@ -39,18 +39,20 @@ class LineContext(Context):
     # Pairs of invariants (a, b), b <= a, that share components: where their products begin, and their rows
     pairs = Integer()
     pair_first = Array(kind=int)
-    pair_a = Array(kind=int)
-    pair_b = Array(kind=int)
     diagonal = Array(kind=int)  # the pair (a, a)
     row_a = Array(kind=int)
     row_b = Array(kind=int)
     ends = Array(kind=int)  # 1 where a partial sum of the products ends
-    # The factors: the invariants in the order of elimination, and of each row of L the columns before it
+    # The factors: the invariants in the order of elimination, and of each row of L the columns before it. The
+    # pairs that its entries are of in the matrix; -1: none
     turn = Array(kind=int)
     lower_first = Array(kind=int)
     lower_column = Array(kind=int)
-    gram = Table("invariants", "invariants")
-    lower = Table("invariants", "invariants")
+    lower_pair = Array(kind=int)
+    lower_entries = Integer()
+    gram = Array("pairs")
+    lower = Array("lower_entries")
+    lower_row = Array("invariants")  # one of its rows, with the zeros
     pivots = Array("invariants")
     right = Array("invariants")
     alpha = Array("invariants")

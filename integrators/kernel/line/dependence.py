@@ -14,6 +14,7 @@ SHIFT = 3e-3  # of the time in which the state changes by its own size: how far 
 DEPENDENT = 1e-9  # what is left of a gradient, relative to it, when it depends on others
 # The first of the invariants is taken whose remainder is no smaller than this part of the largest
 NEARLY = 0.1
+DAMPING, TIMES = 1e-14, 3  # of the diagonal; how often what is left is solved for again
 
 
 def independent(
@@ -24,6 +25,7 @@ def independent(
     y: Array,
     par: Array,
     t: float,
+    known: NDArray[np.bool_],
 ) -> NDArray[np.bool_]:
     """Tell which invariants to keep so that all are kept, one gradient orthogonalized after another.
 
@@ -45,6 +47,8 @@ def independent(
         Diagonal of the metric in which gradients are compared.
     y, par, t
         State, parameters and time.
+    known : ndarray of bool, shape (n,)
+        Invariants that are independent of each other, which need not be found out: they are kept.
 
     Returns
     -------
@@ -64,17 +68,19 @@ def independent(
         remainders = remainders * np.sqrt(metric)
         # So that squares have doubles
         remainders /= _power_of_two(np.abs(remainders).max(axis=(0, 2)))[:, None]
-    chosen = np.zeros(remainders.shape[1], dtype=bool)
+    chosen = known.copy()
     if not np.isfinite(remainders).all():
-        return ~chosen
+        return np.ones_like(chosen)
     sizes = np.linalg.norm(remainders, axis=2)
     sizes[sizes == 0.0] = 1.0
-    for _ in range(chosen.size):
-        left = np.where(chosen, 0.0, (np.linalg.norm(remainders, axis=2) / sizes).max(axis=0))
+    others = np.flatnonzero(~known)
+    sizes, remainders = sizes[:, others], _beside(remainders, known)
+    for _ in range(others.size):
+        left = np.where(chosen[others], 0.0, (np.linalg.norm(remainders, axis=2) / sizes).max(axis=0))
         if left.max() <= DEPENDENT:
             break
         pick = int(np.flatnonzero(left >= NEARLY * left.max())[0])
-        chosen[pick] = True
+        chosen[others[pick]] = True
         for point in remainders:
             length = np.linalg.norm(point[pick])
             if length > 0.0:
@@ -82,6 +88,26 @@ def independent(
                 for _ in range(2):  # twice is enough
                     point -= np.outer(point @ unit, unit)
     return chosen
+
+
+def _beside(remainders: Array, known: NDArray[np.bool_]) -> Array:
+    """Return the other gradients, without their parts along the known ones.
+
+    By the normal equations, which are sparse, and again for what is left. They are damped, for a state where
+    known gradients depend on each other (J. D. Riley, Math. Tables Aids Comput. 9 (1955) 96-101).
+    """
+    others = remainders[:, ~known]
+    if known.any():
+        from scipy.sparse import csr_array, diags_array
+        from scipy.sparse.linalg import splu
+
+        for point, other in zip(remainders[:, known], others, strict=True):
+            gradients = csr_array(point)
+            products = gradients @ gradients.T
+            factors = splu((products + diags_array(DAMPING * products.diagonal())).tocsc())
+            for _ in range(TIMES):
+                other -= (gradients.T @ factors.solve(gradients @ other.T)).T
+    return others
 
 
 def _power_of_two(sizes: Array) -> Array:

@@ -82,7 +82,7 @@ def set_gram(ctx):
             if ctx.ends[i]:
                 whole += part
                 part = 0.0
-        ctx.gram[ctx.invariants * ctx.pair_a[pair] + ctx.pair_b[pair]] = whole
+        ctx.gram[pair] = whole
 
 
 @compiled
@@ -121,24 +121,27 @@ def set_right(ctx):
 @compiled
 def solve_gram(ctx, right, threshold):
     """Replace ``right`` by the solution, by LDL' in the order of ``turn``, without small pivots."""
-    gram, lower, pivots, active = ctx.gram, ctx.lower, ctx.pivots, ctx.active
-    turn, first, columns = ctx.turn, ctx.lower_first, ctx.lower_column
+    gram, lower, entries, pivots, active = ctx.gram, ctx.lower, ctx.lower_row, ctx.pivots, ctx.active
+    turn, first, columns, pairs = ctx.turn, ctx.lower_first, ctx.lower_column, ctx.lower_pair
     n = ctx.invariants
     for i in range(n):
         a = turn[i]
-        pivot = gram[n * a + a]
+        whole = gram[ctx.diagonal[a]]
+        pivot = whole
         for at in range(first[i], first[i + 1]):
             j = columns[at]
-            b = turn[j]
-            value = gram[n * max(a, b) + min(a, b)]
+            value = gram[pairs[at]] if pairs[at] >= 0 else 0.0
             for before in range(first[j], first[j + 1]):
                 k = columns[before]
-                value -= lower[n * i + k] * lower[n * j + k] * pivots[k]
-            lower[n * i + j] = value / pivots[j] if pivots[j] > 0.0 else 0.0
-            pivot -= lower[n * i + j] * lower[n * i + j] * pivots[j]
-        pivots[i] = pivot if active[a] and pivot > threshold * gram[n * a + a] else 0.0
+                value -= entries[k] * lower[before] * pivots[k]
+            entries[j] = value / pivots[j] if pivots[j] > 0.0 else 0.0
+            pivot -= entries[j] * entries[j] * pivots[j]
+        pivots[i] = pivot if active[a] and pivot > threshold * whole else 0.0
         for at in range(first[i], first[i + 1]):
-            right[a] -= lower[n * i + columns[at]] * right[turn[columns[at]]]
+            j = columns[at]
+            lower[at] = entries[j]
+            entries[j] = 0.0
+            right[a] -= lower[at] * right[turn[j]]
         if pivots[i] == 0.0:
             right[a] = 0.0
     for i in range(n):
@@ -147,7 +150,7 @@ def solve_gram(ctx, right, threshold):
         for at in range(first[i], first[i + 1]):
             j = columns[at]
             if pivots[j] > 0.0:
-                right[turn[j]] -= lower[n * i + j] * right[turn[i]]
+                right[turn[j]] -= lower[at] * right[turn[i]]
 
 
 @compiled
@@ -179,6 +182,9 @@ def measure_gap(ctx):
         for d in range(dim):
             ctx.stages[lanes * d + lane] = state[d]
     call_field(ctx.measure, ctx.times, ctx.stages, ctx.par, remainders)
+    if ctx.sized:
+        for d in range(dim):
+            ctx.blocks.terms[d] = steepest(ctx, d) if ctx.length != 0.0 else 0.0
     for a in range(n):
         value = remainders[lanes * (entries + a)]
         gap = value - reference[a]

@@ -59,6 +59,7 @@ class Kept:
         whole = [name.partition("[")[0] for name in self.names]
         self._on_manifold = [name in system.on_manifold for name in whole]
         self._derived = [name in system.derived for name in whole]
+        self._independent = np.array([name in system.independent for name in whole], dtype=bool)
         n, dim = len(self.names), system.dim
         self.code = [line.code()]
         pattern = Pattern.of(system, [])
@@ -85,7 +86,8 @@ class Kept:
             "mode": INVARIANTS if n else POISSON,
             "invariants": n,
             "entries": pattern.count,
-            "pairs": len(pattern.tables["pair_a"]),
+            "pairs": len(pattern.tables["pair_first"]) - 1,
+            "lower_entries": len(pattern.tables["lower_column"]),
             "every": dim + pattern.count + max(dim, n) if n else dim * (1 + dim),
             "sized": int(bool(system.on_manifold)),
             "coefficient_groups": -(-constants.s // 8),
@@ -105,6 +107,7 @@ class Kept:
         """Let partial steps keep what the steps do."""
         for name in ("active", "owed", "metric", "on_manifold", "derived") if self.names else ():
             partial.point({name: getattr(own, name)})
+        partial.point({"blocks.terms": own.blocks.terms})
 
     @property
     def arrays(self) -> tuple[str, ...]:
@@ -142,7 +145,9 @@ class Kept:
             own.largest[:] = own.lost[:] = own.first_loss[:] = 0.0
             own.on_manifold[:], own.derived[:] = self._on_manifold, self._derived
             own.metric[:] = metric_of(self.system, par)
-            own.active[:] = independent(self.system, self.values, self._pattern, own.metric, y, par, t0)
+            own.active[:] = independent(
+                self.system, self.values, self._pattern, own.metric, y, par, t0, self._independent
+            )
 
 
 def function_of(system: System, name: str) -> Function:

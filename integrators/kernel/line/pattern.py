@@ -64,6 +64,7 @@ def _tables(system: System, columns: Sequence[Sequence[int]]) -> dict[str, NDArr
         for _, a in entries:
             touching[a].update(b for _, b in entries)
     pairs = [(a, b) for a in range(n) for b in sorted(touching[a] | {a}) if b <= a]
+    number = {pair: i for i, pair in enumerate(pairs)}
     rows_a, rows_b, last, begins = [], [], [], [0]
     for a, b in pairs:
         shared = sorted((d for d in row[a] if d in row[b]), key=place.__getitem__)
@@ -80,15 +81,18 @@ def _tables(system: System, columns: Sequence[Sequence[int]]) -> dict[str, NDArr
         "column_row": [r for entries in by_column for r, _ in entries],
         "column_owner": [a for entries in by_column for _, a in entries],
         "pair_first": begins,
-        "pair_a": [a for a, _ in pairs],
-        "pair_b": [b for _, b in pairs],
-        "diagonal": [pairs.index((a, a)) for a in range(n)],
+        "diagonal": [number[a, a] for a in range(n)],
         "row_a": rows_a,
         "row_b": rows_b,
         "ends": last,
         "turn": turn,
         "lower_first": np.concatenate([[0], np.cumsum([len(part) for part in lower])]),
         "lower_column": [j for part in lower for j in part],
+        "lower_pair": [
+            number.get((max(turn[i], turn[j]), min(turn[i], turn[j])), -1)
+            for i, part in enumerate(lower)
+            for j in part
+        ],
     }
     return {name: np.array(values, dtype=np.int64) for name, values in lists.items()}
 

@@ -17,6 +17,9 @@ class Blocks(Part):
     # How far the stages of a group are from the state, where a block is one component and all steps have one
     # length. The field of a component is a sum over others, and its rounding of the size of the largest's.
     farthest = Array("count")
+    # Of each row of the field, the sum of its absolute terms in the previous step; 0: not known. A block is
+    # at least what they would make of it in a step alone: what is left where they cancel is their rounding.
+    terms = Array("padded")
     age = Integer()  # steps until sizes are taken anew
     # Velocity by momentum of a block, and the inverse; 1 in first-order form. Blocks compare as velocities:
     # a light body has small momenta, and is no less important.

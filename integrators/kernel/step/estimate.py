@@ -389,7 +389,7 @@ def measure_blocks(ctx):
         high = beyond_noise(high, noise)
         doubtful |= is_doubtful(low, high, doubt)
         changing |= changes(low, high, gammas[GAMMA_0])
-        scale[b] = greatest(scale[b], size(momentum(ctx, d)) + h * slope)
+        scale[b] = greatest(scale[b], size(momentum(ctx, d)) + h * greatest(slope, blocks.terms[d]))
         slopes[b] = greatest(slopes[b], slope)
         gamma_error[b] = greatest(gamma_error[b], error)
         gamma_last[b] = greatest(gamma_last[b], quadrature_error)

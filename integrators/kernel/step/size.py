@@ -137,7 +137,7 @@ def take_sizes(ctx):
     blocks = ctx.blocks
     forget_sizes(ctx)
     for d in range(ctx.rows):
-        enter_size(ctx, d, stage_size(ctx, d, splat8(0.0)))
+        enter_size(ctx, d, max(stage_size(ctx, d, splat8(0.0)), abs(ctx.h) * blocks.terms[d]))
     if ctx.varying == 0 and blocks.count == ctx.rows:
         for d in range(ctx.rows):
             g = blocks.group[blocks.of_row[d]]
