@@ -1,0 +1,1 @@
+"""Methods for mechanical systems with constraints, beside HBVM."""
