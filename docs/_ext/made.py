@@ -20,8 +20,8 @@ FIELDS = {
     "Molecules": ("molecular_dynamics", "molecular_dynamics_sizes", "water"),
     "Lattices and partial differential equations": ("lattice", "grids"),
     "Mechanics": (
-        "own_system", "linkages", "rattle", "mass_matrix", "impacts", "bouncing_ball", "measured_forcing",
-        "fit",
+        "own_system", "linkages", "rattle", "squeezer", "mass_matrix", "impacts", "bouncing_ball",
+        "measured_forcing", "fit",
     ),
     "Chaos": ("section", "exponents", "chaos_map", "ensemble", "short"),
     "Stiff chemistry": ("stiff",),

@@ -44,6 +44,7 @@ SAYS = {
     "scaling.py": ["| threads | time (s) | speed-up | efficiency |", "\n| 1 | ", " | 1.00 | 100% |"],
     "section.py": ["3793 passages", "accurate: HBVM, heyoka"],
     "rattle.py": ["HBVM() is nearest to the problem in angles: True"],
+    "squeezer.py": ["energy and loops at round-off: True", "the published solution to nine digits: True"],
     "water.py": ["HBVM() keeps energy and bonds at round-off: True"],
     "solution.py": ["the same from a file: True True", "the same from another process: True"],
 }
@@ -132,6 +133,7 @@ SLOW |= {"chaos_map.py", "ensemble.py"}
 SLOW |= {
     "water.py",
     "rattle.py",
+    "squeezer.py",
     "molecular_dynamics.py",
     "exponents.py",
     "plugin.py",
