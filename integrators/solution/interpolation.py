@@ -69,6 +69,11 @@ class Interpolant:
         return 1.0 if self.end >= self.problem.t0 else -1.0
 
     @cached_property
+    def _ahead(self) -> Array:
+        """The samples' times, in rising order."""
+        return self._sign * self.t
+
+    @cached_property
     def _owner(self) -> NDArray[np.int64]:
         """The number of the segment of each sample."""
         return self.segments.places(self.t, self.rows[:, : self.problem.system.dim])
@@ -87,15 +92,13 @@ class Interpolant:
         problems.errors.InputError
             For times outside the interval, or where the method does not go on from the sample before.
         """
-        sign, at = self._sign, self._sign * self.t
+        if times.size == 1:
+            return self._row(float(times.reshape(-1)[0])).reshape(*times.shape, -1)
+        sign, at = self._sign, self._ahead
         wanted, places = np.unique(sign * times, return_inverse=True)
         inside = (wanted >= at[0]) & (wanted <= sign * self.end)
         if not inside.all():
-            wrong = float(sign * wanted[int(np.argmin(inside))])
-            raise InputError(
-                f"t={wrong!r} is not between t = {float(self.t[0])!r} and {self.end!r}, "
-                "which the solution covers."
-            )
+            raise self._outside(float(sign * wanted[int(np.argmin(inside))]))
         sample = np.searchsorted(at, wanted, side="right") - 1
         found = np.empty((wanted.size, self.rows.shape[1]))
         intervals, first, count = np.unique(sample), 0, 1
@@ -121,6 +124,22 @@ class Interpolant:
         found[own] = self.rows[sample[own]]
         return found[places.reshape(times.shape)]
 
+    def _row(self, t: float) -> Array:
+        """Return the row at one time; most of what several cost is to sort them."""
+        sample = int(self._ahead.searchsorted(self._sign * t, side="right")) - 1
+        if sample < 0 or not self._sign * t <= self._sign * self.end:
+            raise self._outside(t)
+        if self.t[sample] == t:
+            return self.rows[sample].copy()
+        reached = self._reached(sample, np.array([t]), alone=True)
+        assert reached is not None
+        return reached[0]
+
+    def _outside(self, t: float) -> InputError:
+        return InputError(
+            f"t={t!r} is not between t = {float(self.t[0])!r} and {self.end!r}, which the solution covers."
+        )
+
     def _met(self, group: NDArray[np.int64], reached: Array) -> int:
         """Return how many of some samples are met in a row: from them the method goes on as it is."""
         dim = self.problem.system.dim
@@ -129,7 +148,10 @@ class Interpolant:
         return group.size if met.all() else int(np.argmin(met))
 
     def _reached(self, sample: int, goals: Array, *, alone: bool) -> Array | None:
-        """Return the rows at times from a sample on; ``None`` if the method fails beyond its interval."""
+        """Return the rows at times from a sample on; ``None`` if the method fails beyond its interval.
+
+        Not where the times are in this interval ``alone``: then that raises.
+        """
         if not goals.size:
             return self.rows[:0]
         row, start, dim = self.rows[sample], float(self.t[sample]), self.problem.system.dim
