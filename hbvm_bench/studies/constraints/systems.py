@@ -1,4 +1,4 @@
-"""The systems of the campaign ``constraints.toml``: point masses on rods, in Cartesian coordinates."""
+"""The systems of the study of constraints: point masses on rods, in Cartesian coordinates."""
 
 import numpy as np
 
