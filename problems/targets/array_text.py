@@ -7,7 +7,7 @@ import numpy as np
 from problems.graph.functions import CALLED
 from problems.graph.nodes import Affine, Loop, Node
 from problems.targets.plan import Fill, Plan, Scatter
-from problems.targets.printer import Printer
+from problems.targets.printer import Places, Printer
 
 
 class _ArrayPrinter(Printer):
@@ -31,11 +31,12 @@ class _ArrayPrinter(Printer):
 
     def _inside(self, node: Node, loop: Loop) -> None:
         """Print a value inside a loop."""
-        if node.op == "index":
-            table = self._table(node.data.values(loop).astype(np.float64))
-            self.assign(node, f"{table}.reshape((-1,) + (1,)*(y.ndim - 1))")
-        else:
-            self.let(node, lambda affine: self._places(affine, loop))
+        self.let(node, lambda affine: self._places(affine, loop))
+
+    def visit_index(self, node: Node, index: Places) -> None:
+        assert node.loop is not None
+        table = self._table(node.data.values(node.loop).astype(np.float64))
+        self.assign(node, f"{table}.reshape((-1,) + (1,)*(y.ndim - 1))")
 
     def reduce(self, node: Node, loop: Loop, body: Sequence[Node]) -> None:
         for inner in body:

@@ -8,7 +8,7 @@ from problems.graph.functions import CALLED
 from problems.graph.nodes import READS, Loop, Node
 from problems.targets.loops import Nest, Range, Table, nest, ranges
 from problems.targets.plan import Fill, Plan, Scatter
-from problems.targets.printer import Printer, variable
+from problems.targets.printer import Places, Printer, variable
 
 _FUNCTIONS = {name: f.numba for name, f in CALLED.items()}
 
@@ -56,12 +56,9 @@ class _NumbaPrinter(Printer):
         self.assign(node, f"out[{spare}]")
         self._loop(loop, body, node)
 
-    def _inside(self, node: Node, header: Range | Nest | Table) -> None:
-        """Print a value inside a loop."""
-        if node.op == "index":
-            self.assign(node, f"float({header.index(node.data)})")
-        else:
-            self.let(node, header.index)
+    def visit_index(self, node: Node, index: Places) -> None:
+        assert index is not None
+        self.assign(node, f"float({index(node.data)})")
 
     def _loop(self, loop: Loop, body: Sequence[Node], target: Scatter | Node) -> None:
         """Print a loop that adds to the outputs of a scatter, or to a declared sum."""
@@ -91,7 +88,7 @@ class _NumbaPrinter(Printer):
             self.line(line)
         self.indent = outside + "    " * bool(opening)
         for node in body:
-            self._inside(node, header)
+            self.let(node, header.index)
         before = {first: variable("summed", first) for first in carried}
         self._add_to(
             target, header, before, {second: variable("summed", first) for first, second in carried.items()}
@@ -112,7 +109,7 @@ class _NumbaPrinter(Printer):
         self.indent = outside + "    "
         for node in body:
             if node.id in outer:
-                self._inside(node, header)
+                self.let(node, header.index)
                 if self.waiting(node):  # for the inner loop
                     self.assign(node, self.text(node))
         entries = target.entries if isinstance(target, Scatter) else ()
@@ -122,7 +119,7 @@ class _NumbaPrinter(Printer):
         self.indent = outside + "        "
         for node in body:
             if node.id not in outer:
-                self._inside(node, header)
+                self.let(node, header.index)
         variables = {i: variable("summed", i) for i in held}
         self._add_to(target, header, variables, variables)
         self.indent = outside + "    "

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 
 from problems.graph.arithmetic import ARITHMETIC, LEAF, SUM
+from problems.graph.fold import Visitor
 from problems.graph.nodes import Affine, Loop, Node
 from problems.targets.plan import Fill, Let, Plan, Reduce, Statement, Store, array_of
 
@@ -27,7 +28,11 @@ def variable(kind: str, number: int) -> str:
     return f"{_PREFIX[kind]}{number}"
 
 
-class Printer:
+Places = Callable[[Affine], str] | None
+"""What prints a place that differs from term to term of a loop."""
+
+
+class Printer(Visitor[None]):
     """Prints a plan's statements; a value used once is printed where it is used.
 
     Parameters
@@ -99,36 +104,65 @@ class Printer:
         self.names[node.id] = name
         self.line(f"{name} = {text}")
 
-    def let(self, node: Node, index: Callable[[Affine], str] | None = None) -> None:
+    def let(self, node: Node, index: Places = None) -> None:
         """Read an input, compute a value, or keep its text for the one place that uses it.
 
         ``index`` returns the text of a place that differs from term to term of a loop.
         """
-        if node.op == "symbol":
-            space, place = node.data
-            if space == "t":
-                self.names[node.id] = "t"
-            elif isinstance(place, int):
-                self.assign(node, f"{space}[{place}]", variable(space, place))
-            else:
-                assert index is not None
-                self.assign(node, f"{space}[{index(place)}]")
-        elif node.op == "element":
-            stage, place = node.data
-            text = str(place) if isinstance(place, int) or index is None else index(place)
-            self.assign(node, f"{array_of(stage)}[{text}]")
-        elif node.op == "entry":
-            constants, place = node.data
+        self.visit(node, [index])
+
+    def visit_const(self, node: Node, index: Places) -> None:
+        """Do nothing: constants are printed where they are used."""
+
+    def visit_symbol(self, node: Node, index: Places) -> None:
+        space, place = node.data
+        if space == "t":
+            self.names[node.id] = "t"
+        elif isinstance(place, int):
+            self.assign(node, f"{space}[{place}]", variable(space, place))
+        else:
             assert index is not None
-            name = self.table(f"np.array({constants.values.tolist()!r})")
-            self.assign(node, self.entry(name, index(place)))
-        elif node.op != "const":
-            text, level = self._operation(node)
-            if self.plan.uses[node.id] == 1 and len(text) < _LONGEST:
-                self._pending[node.id] = (text, level)
-                self.names.pop(node.id, None)  # of an earlier loop over the same body
-            else:
-                self.assign(node, text)
+            self.assign(node, f"{space}[{index(place)}]")
+
+    def visit_element(self, node: Node, index: Places) -> None:
+        stage, place = node.data
+        text = str(place) if isinstance(place, int) or index is None else index(place)
+        self.assign(node, f"{array_of(stage)}[{text}]")
+
+    def visit_entry(self, node: Node, index: Places) -> None:
+        constants, place = node.data
+        assert index is not None
+        name = self.table(f"np.array({constants.values.tolist()!r})")
+        self.assign(node, self.entry(name, index(place)))
+
+    def visit_table(self, node: Node, index: Places) -> None:
+        parts = (list(node.data.knots), list(map(list, node.data.rows)))
+        arrays = ", ".join(self.table(f"np.array({part!r})") for part in parts)
+        self._keep(node, f"table({arrays}, {self.text(node.args[0])})", LEAF)
+
+    def visit_operation(self, node: Node, *_: Places) -> None:
+        known = ARITHMETIC.get(node.op)
+        if known is None:
+            self._keep(node, self._call(self._functions[node.op], node.args), LEAF)
+        elif known.arity == 1:
+            self._keep(node, known.text + self.text(node.args[0], LEAF), known.level)
+        else:
+            left = self.text(node.args[0], known.level)
+            self._keep(node, left + known.text + self.text(node.args[1], known.level + 1), known.level)
+
+    def _call(self, name: str, args: Sequence[Node]) -> str:
+        if len(args) > 1:
+            return name.format(*(self.text(arg, LEAF) for arg in args))
+        text = self.text(args[0])
+        return name.format(text) if "{" in name else f"{name}({text})"
+
+    def _keep(self, node: Node, text: str, level: int) -> None:
+        """Keep the text of a value that is used once, or print it."""
+        if self.plan.uses[node.id] == 1 and len(text) < _LONGEST:
+            self._pending[node.id] = (text, level)
+            self.names.pop(node.id, None)  # of an earlier loop over the same body
+        else:
+            self.assign(node, text)
 
     def entry(self, name: str, place: str) -> str:
         """Return the text of a number of an array, or of one for each term of a loop."""
@@ -146,21 +180,3 @@ class Printer:
             return self.names[node.id]
         text, binding = self._pending.pop(node.id)
         return text if binding >= level else f"({text})"
-
-    def _operation(self, node: Node) -> tuple[str, int]:
-        known = ARITHMETIC.get(node.op)
-        if known is not None and known.arity == 1:
-            return known.text + self.text(node.args[0], LEAF), known.level
-        if known is not None:
-            left = self.text(node.args[0], known.level)
-            return left + known.text + self.text(node.args[1], known.level + 1), known.level
-        if node.op == "table":
-            parts = (list(node.data.knots), list(map(list, node.data.rows)))
-            arrays = ", ".join(self.table(f"np.array({part!r})") for part in parts)
-            return f"table({arrays}, {self.text(node.args[0])})", LEAF
-        name = self._functions[node.op]
-        first, *others = node.args
-        if others:
-            return name.format(*(self.text(arg, LEAF) for arg in node.args)), LEAF
-        text = self.text(first)
-        return (name.format(text) if "{" in name else f"{name}({text})"), LEAF
