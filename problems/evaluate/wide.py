@@ -32,16 +32,13 @@ def _guarded(function: Callable[..., Any], arguments: int) -> Callable[..., Any]
             value = function(*args)
         except (ArithmeticError, ValueError):  # a pole, or outside of a function's domain
             return _WIDE.nan
-        return value if isinstance(value, _WIDE.mpf) else _WIDE.nan  # a root of a negative number is complex
+        return _WIDE.nan if isinstance(value, _WIDE.mpc) else _WIDE.mpf(value)  # a root of a negative number
 
     return np.frompyfunc(guarded, arguments, 1)
 
 
-_OF_OTHER_NAMES: dict[str, Callable[..., Any]] = {
-    "abs": abs, "round": _WIDE.nint, "where": CALLED["where"].value
-}  # fmt: skip
 _OPERATIONS: dict[str, tuple[Callable[..., Any], int]] = {
-    **{name: (_OF_OTHER_NAMES.get(name) or getattr(_WIDE, name), f.arity) for name, f in CALLED.items()},
+    **{name: (getattr(_WIDE, f.mpmath, f.value), f.arity) for name, f in CALLED.items()},
     **{name: (record.value, record.arity) for name, record in ARITHMETIC.items()},
     "pow": (operator.pow, 2),
 }

@@ -58,8 +58,10 @@ class Elementary:
     numpy, numba, jax : str
         Name in the library, or text with ``{}`` for the arguments; by default the same name. Those of
         numba are from `math`, or else from NumPy; those of NumPy and JAX without a dot from `scipy.special`.
+    mpmath : str
+        Name in mpmath; of what it does not have, ``value`` is taken, with the digits of doubles.
     heyoka : str or None
-        The same; ``None`` for what heyoka does not have: it is refused.
+        As for NumPy; ``None`` for what heyoka does not have: it is refused.
     latex : str
         Text with ``%s`` for the arguments.
     cost : int
@@ -78,6 +80,7 @@ class Elementary:
     numpy: str = ""
     numba: str = ""
     jax: str = ""
+    mpmath: str = ""
     heyoka: str | None = ""
     latex: str = ""
     cost: int = SLOW
@@ -85,7 +88,7 @@ class Elementary:
 
     def __post_init__(self) -> None:
         names = {"numpy": f"np.{self.name}", "numba": self.name, "jax": f"jnp.{self.name}"}
-        names |= {"heyoka": f"hy.{self.name}", "latex": rf"\{self.name}\left(%s\right)"}
+        names |= {"mpmath": self.name, "heyoka": f"hy.{self.name}", "latex": rf"\{self.name}\left(%s\right)"}
         for field, text in names.items():
             if getattr(self, field) == "":
                 object.__setattr__(self, field, text)
@@ -181,6 +184,7 @@ _RECORDS = (
         derivative=lambda x: Slope(_applied("sign", x)),
         double_double=double_double.absolute,
         numba="fabs",
+        mpmath="fabs",
         heyoka="(hy.relu({0}) + hy.relu(-({0})))",
         latex=r"\left|%s\right|",
         cost=1,
@@ -205,6 +209,7 @@ _RECORDS = (
         # The sum has no digits behind the point. Of numbers beyond 2^51 the result may be off by one.
         numba=f"(({{}} + {WHOLE}) - {WHOLE})",
         jax="jnp.rint",
+        mpmath="nint",
         heyoka=None,
         latex=r"\operatorname{round}\left(%s\right)",
         cost=1,
