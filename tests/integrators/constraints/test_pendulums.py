@@ -95,6 +95,22 @@ def test_a_double_pendulum_in_cartesian_coordinates_moves_as_in_angles(angles, t
     assert max(errors[name].max() for name in NAMES[1:]) < 2e-15  # measured 3.3e-16
 
 
+def test_where_nothing_moves_the_energy_is_what_is_left_out():
+    # its gradient is that of the rod, by the multiplier; constraints are kept
+    hanging_still = Problem(chain(1), q0=[0.0, -1.0], p0=[0.0, 0.0], t_end=10.0)
+    solution = integrate(hanging_still, HBVM(), [10.0])
+    assert solution.stats.extra["left_out"] == ["energy"]
+    assert np.abs(solution.y[-1] - [0.0, -1.0, 0.0, 0.0]).max() < 1e-15  # measured 0
+
+
+def test_an_invariant_that_follows_from_constraints_is_left_out():
+    again = chain(2, invariants={"again": lambda q: 3.0 * rod(0)(q) + rod(1, 0)(q)})
+    problem = Problem(again, q0=hanging(np.array([0.5, 0.5])), p0=np.zeros(4), t_end=10.0)
+    solution = integrate(problem, HBVM(), [10.0])
+    assert solution.stats.extra["left_out"] == ["again"]
+    assert max(error.max() for error in solution.errors().values()) < 2e-15  # measured 3e-16
+
+
 def test_rods_in_a_loop_are_those_written_one_by_one():
     places = hanging(np.linspace(0.3, 1.2, 10))
     one_by_one, loop = (
