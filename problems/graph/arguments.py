@@ -12,7 +12,17 @@ from numpy.typing import NDArray
 from problems import limits
 from problems.errors import InputError, shown, unknown
 from problems.graph import sums
-from problems.graph.each import Constants, Each, constants, dot, each, flat_index, place_of, scatter
+from problems.graph.each import (
+    Constants,
+    Each,
+    components,
+    constants,
+    dot,
+    each,
+    flat_index,
+    place_of,
+    scatter,
+)
 from problems.graph.functions import OF_ONE_ARGUMENT
 from problems.graph.nodes import PAR, Condition, Graph, Node, P, Q, T
 from problems.graph.source_line import line_of_function, line_of_traceback, refuse
@@ -58,32 +68,15 @@ class Vector:
         place = self._offset + i
         return self._graph.symbol(self._space, place, flags=self._flags(place, place))
 
-    def _outside(self, i: int) -> NoReturn:
-        refuse(f"{self._name}[{i}] does not exist", f"{self._name} has the indices 0 to {self._size - 1}")
-
     def __getitem__(self, i: Any) -> Any:
         if isinstance(i, slice):
             return Slice(self, range(self._size)[i])
-        if isinstance(i, sums.Index):
-            affine = i.affine.shifted(self._offset)
-            places = affine.values(i.loop)
-            low, high = int(places.min()), int(places.max())
-            if low < self._offset:
-                self._outside(low - self._offset)
-            if high >= self._offset + self._size:
-                self._outside(high - self._offset)
-            if not any(affine.coefficients):
-                return self._at(i.affine.offset)
-            return self._graph.symbol(self._space, affine, flags=self._flags(low, high), loop=i.loop)
-        if isinstance(i, Node):
-            refuse(f"{self._name}[...] is indexed by a symbol", "use integers, or the indices of m.sum")
-        try:
-            k = i.__index__()
-        except AttributeError:
-            refuse(f"{self._name}[{i!r}] is not an index", "use integers")
-        if not -self._size <= k < self._size:
-            self._outside(k)
-        return self._at(k % self._size)
+        place, loop = place_of(i, self._size, self._name)
+        if loop is None:
+            return self._at(place)
+        places = place.shifted(self._offset).values(loop)
+        flags = self._flags(int(places.min()), int(places.max()))
+        return self._graph.symbol(self._space, place.shifted(self._offset), flags=flags, loop=loop)
 
     def __setitem__(self, i: Any, value: Any) -> NoReturn:
         refuse(
@@ -424,6 +417,10 @@ def call(
     graph.limit = int(min(limits.limit("OPERATIONS"), 2**62))
     try:
         result = function(*arguments, **named)
+        if is_list(result):
+            written = sum(not isinstance(part, Each) for _, part in components(result))
+            place = f"{line_of_function(function)}: {label}"
+            limits.check(place, "OPERATIONS", written, limits.WRITTEN_OUT)
         if not _same(result, function(*arguments, **named)):
             raise InputError(
                 f"{line_of_function(function)}: {label} is another formula when it is called again; draw "

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from problems import limits
 from problems.errors import shown
-from problems.graph.loops import Affine, Loop, Place, Summands
+from problems.graph.loops import Affine, Loop, Summands
 from problems.graph.nodes import Graph, Node
 from problems.graph.source_line import refuse, users_line
 from problems.graph.sums import Index, Ragged, declare, listed, rows_of, scope
@@ -39,7 +39,7 @@ class Each:
     def __getitem__(self, i: Any) -> Any:
         if isinstance(i, slice):
             return [self[k] for k in range(self._size)[i]]
-        place, loop = place_of(i, self._size, "these values")
+        place, loop = place_of(i, self._size, "this array")
         return self._graph.element(self._graph.stage(self._size, self.loops, self.terms), place, loop)
 
     def _whole(self, *_: Any, **__: Any) -> NoReturn:
@@ -54,24 +54,24 @@ class Each:
     __hash__ = object.__hash__
 
 
-def place_of(i: Any, size: int, name: str) -> tuple[Place, Loop | None]:
-    """Return where an index points to in so many values, and the loop that it varies in."""
+def place_of(i: Any, size: int, name: str) -> tuple[Any, Loop | None]:
+    """Return where an index points to in so many values, a `Place`, and the loop that it varies in."""
     if isinstance(i, Index):
         places = i.affine.values(i.loop)
         for place in (int(places.min()), int(places.max())):
             if not 0 <= place < size:
-                refuse(f"{name}[{place}] does not exist", f"there are the indices 0 to {size - 1}")
+                refuse(f"{name}[{place}] does not exist", f"{name} has the indices 0 to {size - 1}")
         if not any(i.affine.coefficients):
             return i.affine.offset, None
         return i.affine, i.loop
     if isinstance(i, Node):
-        refuse(f"{name} are indexed by a symbol", "use integers, or the indices of a loop")
+        refuse(f"{name}[...] is indexed by a symbol", "use integers, or the indices of a loop")
     try:
         k = i.__index__()
     except AttributeError:
         refuse(f"{name}[{i!r}] is not an index", "use integers")
     if not -size <= k < size:
-        refuse(f"{name}[{k}] does not exist", f"there are the indices 0 to {size - 1}")
+        refuse(f"{name}[{k}] does not exist", f"{name} has the indices 0 to {size - 1}")
     return k % size, None
 
 
@@ -222,7 +222,7 @@ def scatter(graph: Graph, term: Callable[..., Any], index: Iterable[Any], n: int
             refuse("the term of m.scatter returns no dictionary", _PAIRS)
         entries = []
         for key, value in values.items():
-            place, _ = place_of(key, n, "the sums")
+            place, _ = place_of(key, n, "the list of sums")
             affine = place if isinstance(place, Affine) else Affine((0,) * loop.width, place)
             entries.append((affine, graph.lifted_to(graph.node(value), loop)))
     return Each(graph, n, ((loop, tuple(entries)),))
