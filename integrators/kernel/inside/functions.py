@@ -21,17 +21,21 @@ LANES = 8
 UNDEFINED = (ArithmeticError, ValueError)  # 1/0, math.sqrt(-1): not a number, as in compiled code
 
 
-class EventFunction:
-    """A user's function for one system.
+class UserFunction:
+    """A user's function for one system, traced and compiled, or called back where it cannot be traced.
 
     Parameters
     ----------
-    name : str
-        Of the event, for messages.
-    g : callable
+    label : str
+        What it is, for messages.
+    function : callable
         The function.
     problem : Problem
         What it is a function of the states of. Other starts and parameters may follow.
+    trace : callable
+        ``trace(function, label)`` makes a graph of it.
+    count : int
+        How many numbers it has.
 
     Attributes
     ----------
@@ -46,14 +50,31 @@ class EventFunction:
         If it can neither be traced nor called with numbers.
     """
 
-    def __init__(self, name: str, g: Callable[..., Any], problem: Problem):
-        self._system, self._raised = problem.system, _Raised()
+    def __init__(
+        self,
+        label: str,
+        function: Callable[..., Any],
+        problem: Problem,
+        trace: Callable[..., Any],
+        count: int,
+    ):
+        self._system, self._label, self._raised, self._count = problem.system, label, _Raised(), count
         try:
-            traced = problem.system.trace(g, f"event {name!r}")
+            traced = trace(function, label)
         except InputError as refused:
-            self._g, self._wanted = g, _wanted(g, refused)
-            self._check(problem, refused)
-            self._alive, self.address = _called_back(self._call)
+            self._function, self._wanted = function, _wanted(function, refused)
+            with np.errstate(all="ignore"):
+                try:
+                    self._check(problem.t0, problem.y0.copy(), problem.par.copy())
+                except InputError:
+                    raise
+                except Exception:
+                    raise refused from None
+            # What keeps a Python function alive that compiled code calls.
+            self._alive = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 4)(self._call)
+            address = ctypes.cast(self._alive, ctypes.c_void_p).value
+            assert address is not None
+            self.address = address
         else:
             self.address = _compiled(traced).address
         self.calls_back = hasattr(self, "_alive")
@@ -62,143 +83,88 @@ class EventFunction:
     def error(self) -> BaseException | None:
         """What the function raised last in this thread, if Python runs it.
 
-        The values are NaN then, and the flag behind them (the ninth number there) is set.
+        The values are NaN then, and the flag behind them is set.
         """
         return self._raised.error
 
-    def _check(self, problem: Problem, refused: InputError) -> None:
-        value: Any = np.nan
-        try:
-            with np.errstate(all="ignore"):
-                value = self._evaluate(problem.t0, problem.y0.copy(), self._parameters(problem.par))
-        except UNDEFINED:
-            pass
-        except Exception:
-            raise refused from None
-        try:
-            float(value)
-        except Exception:
-            raise refused from None
+    def _check(self, t: float, y: Any, par: Any) -> None:
+        """Raise what says that the function is of no use."""
+        raise NotImplementedError
 
-    def _parameters(self, par: Any) -> SimpleNamespace:
-        return SimpleNamespace(**self._system.unpack(par))
+    def _fill(self, times: list[float], states: Any, par: Any, values: Any) -> None:
+        """Set the values, shape (count, `LANES`), at so many times and states."""
+        raise NotImplementedError
 
-    def _evaluate(self, t: float, y: Any, par: SimpleNamespace) -> Any:
-        return _called(self._g, self._wanted, self._system.dof, t, y, par)
+    def _evaluate(self, t: float, y: Any, par: Any) -> Any:
+        """Return what the function makes of the arguments that it wants."""
+        dof, parameters = self._system.dof, SimpleNamespace(**self._system.unpack(par))
+        offered: dict[str, Any] = {"t": t, "y": y, "par": parameters, "m": np}
+        if dof is not None:
+            offered |= {"q": y[:dof], "p": y[dof:]}
+        return self._function(*[offered[name] for name in self._wanted])
 
     def _call(self, t: int, states: int, par: int, values: int) -> None:
-        """Evaluate state by state; equal ones that follow each other only once."""
+        dim, n_par, end = self._system.dim, self._system.n_par, LANES * self._count
         try:
-            outputs = _numbers(values, LANES + 1)
-            outputs[:LANES] = np.nan
+            outputs = _numbers(values, end + 1)
+            outputs[:end] = np.nan
             if raised.kept() is not None:
-                outputs[LANES] = 1.0
+                outputs[end] = 1.0
                 return
-            times, dim = _numbers(t, LANES).tolist(), self._system.dim
             columns = _numbers(states, LANES * dim).reshape(dim, LANES).T.copy()
-            given = self._parameters(_numbers(par, self._system.n_par).copy())
-            for i in range(LANES):
-                if i and times[i] == times[i - 1] and np.array_equal(columns[i], columns[i - 1]):
-                    outputs[i] = outputs[i - 1]
-                    continue
-                value: Any = np.nan
-                with suppress(*UNDEFINED), np.errstate(all="ignore"):
-                    value = self._evaluate(times[i], columns[i].copy(), given)
-                outputs[i] = float(value)  # what is no number is an error, and not a place without a value
+            given = _numbers(par, n_par).copy()
+            self._fill(_numbers(t, LANES).tolist(), columns, given, outputs[:end].reshape(-1, LANES))
         except BaseException as error:  # also Ctrl-C: nothing passes through compiled code
             self._raised.error = error
-            _numbers(values, LANES + 1)[LANES] = 1.0
+            _numbers(values, end + 1)[end] = 1.0
 
 
-class Action:
-    """What an event makes of the state and the parameters, for one system: a function like `EventFunction`.
+class EventFunction(UserFunction):
+    """The function of the event ``name`` for one system; see `UserFunction`."""
 
-    Parameters
-    ----------
-    name : str
-        Of the event, for messages.
-    then : callable
-        The function.
-    problem : Problem
-        What it is a function of the states of.
+    def __init__(self, name: str, g: Callable[..., Any], problem: Problem):
+        super().__init__(f"event {name!r}", g, problem, problem.system.trace, 1)
 
-    Attributes
-    ----------
-    address : int
-        Of the C function, of dim values, or dim + n_par where it changes parameters; the state in the first
-        lane is the one that counts.
-    calls_back : bool
-        Whether Python runs it.
+    def _check(self, t: float, y: Any, par: Any) -> None:
+        value: Any = np.nan
+        with suppress(*UNDEFINED):
+            value = self._evaluate(t, y, par)
+        float(value)
 
-    Raises
-    ------
-    problems.errors.InputError
-        If it can neither be traced nor called with numbers, or does not return a state.
+    def _fill(self, times: list[float], states: Any, par: Any, values: Any) -> None:
+        """Evaluate state by state; equal ones that follow each other only once."""
+        for i in range(LANES):
+            if i and times[i] == times[i - 1] and np.array_equal(states[i], states[i - 1]):
+                values[0, i] = values[0, i - 1]
+                continue
+            value: Any = np.nan
+            with suppress(*UNDEFINED), np.errstate(all="ignore"):
+                value = self._evaluate(times[i], states[i].copy(), par)
+            values[0, i] = float(value)  # what is no number is an error, and not a place without a value
+
+
+class Action(UserFunction):
+    """What the event ``name`` makes of the state and the parameters, for one system; see `UserFunction`.
+
+    It has dim values, or dim + n_par where it changes parameters; the state in the first lane is the one that
+    counts. One that does not return a state is refused.
     """
 
     def __init__(self, name: str, then: Callable[..., Any], problem: Problem):
-        self._system, self._raised = problem.system, _Raised()
+        system = problem.system
         label = f"then of event {name!r}"
-        try:
-            traced = problem.system.trace_change(then, label)
-        except InputError as refused:
-            self._then, self._wanted, self._label = then, _wanted(then, refused), label
-            with np.errstate(all="ignore"):
-                try:
-                    self._change(problem.t0, problem.y0.copy(), problem.par.copy())
-                except InputError:
-                    raise
-                except Exception:
-                    raise refused from None
-            self._alive, self.address = _called_back(self._call)
-        else:
-            self.address = _compiled(traced).address
-        self.calls_back = hasattr(self, "_alive")
+        super().__init__(label, then, problem, system.trace_change, system.dim + system.n_par)
 
-    @property
-    def error(self) -> BaseException | None:
-        """What the function raised last in this thread, if Python runs it."""
-        return self._raised.error
+    def _check(self, t: float, y: Any, par: Any) -> None:
+        self._change(t, y, par)
 
     def _change(self, t: float, y: Any, par: Any) -> Any:
         """Return the new state, and behind it the new parameters."""
-        parameters = SimpleNamespace(**self._system.unpack(par))
-        value = _called(self._then, self._wanted, self._system.dof, t, y, parameters)
-        return np.concatenate(
-            [np.asarray(part, np.float64) for part in self._system.changed(value, y, par, self._label)]
-        )
+        changed = self._system.changed(self._evaluate(t, y, par), y, par, self._label)
+        return np.concatenate([np.asarray(part, np.float64) for part in changed])
 
-    def _call(self, t: int, states: int, par: int, values: int) -> None:
-        dim, n_par = self._system.dim, self._system.n_par
-        count = dim + n_par
-        try:
-            if raised.kept() is not None:
-                _numbers(values, LANES * count + 1)[LANES * count] = 1.0
-                return
-            state = _numbers(states, LANES * dim)[::LANES].copy()
-            given = _numbers(par, n_par).copy()
-            _numbers(values, LANES * count)[::LANES] = self._change(float(_numbers(t, 1)[0]), state, given)
-        except BaseException as error:  # also Ctrl-C: nothing passes through compiled code
-            self._raised.error = error
-            _numbers(values, LANES * count + 1)[LANES * count] = 1.0
-
-
-def _called(
-    function: Callable[..., Any], wanted: list[str], dof: int | None, t: float, y: Any, par: SimpleNamespace
-) -> Any:
-    """Return what a function makes of the arguments that it wants."""
-    offered: dict[str, Any] = {"t": t, "y": y, "par": par, "m": np}
-    if dof is not None:
-        offered |= {"q": y[:dof], "p": y[dof:]}
-    return function(*[offered[name] for name in wanted])
-
-
-def _called_back(call: Callable[..., None]) -> tuple[Any, int]:
-    """Return what keeps a Python function alive that compiled code calls, and its address."""
-    alive = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 4)(call)
-    address = ctypes.cast(alive, ctypes.c_void_p).value
-    assert address is not None
-    return alive, address
+    def _fill(self, times: list[float], states: Any, par: Any, values: Any) -> None:
+        values[:, 0] = self._change(times[0], states[0].copy(), par)
 
 
 class _Raised(threading.local):
