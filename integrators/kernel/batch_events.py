@@ -9,7 +9,7 @@ from itertools import pairwise
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from integrators.events.event import Event
 from integrators.events.finder import Ending, ended_by
@@ -20,10 +20,10 @@ from integrators.kernel.engines import look
 from integrators.kernel.ensemble.group import ACCUMULATES, BY_EVENT
 from integrators.kernel.ensemble.prepared import Lanes
 from integrators.kernel.inside.functions import Action, EventFunction
-from integrators.kernel.inside.search import give_room, room_for, search_memory
+from integrators.kernel.inside.search import Log, room_for, search_memory
 from integrators.kernel.pace import FEWEST, Pace
 from integrators.kernel.stepper import CHUNK_WITH_EVENTS, HBVMStepper, accumulated
-from integrators.protocol import Array, Samples, Status
+from integrators.protocol import Samples, Status
 from integrators.refusals import check_batch, check_times
 from integrators.solution.occurrences import Occurrences
 
@@ -136,40 +136,11 @@ class _Work(Work):
 
 
 @dataclass(frozen=True, eq=False)
-class _Log:
-    """Occurrences of events in the order in which they were found: room for them, or a part of it."""
-
-    members: NDArray[np.int64]
-    times: Array
-    states: Array
-    after: Array
-    par: Array
-    events: NDArray[np.int64]
-    directions: NDArray[np.int64]
-
-    @classmethod
-    def empty(cls, room: int, dim: int, parameters: int) -> "_Log":
-        """Return room for so many."""
-        members, events, directions = (np.empty(room, np.int64) for _ in range(3))
-        states, after = (np.empty((room, dim)) for _ in range(2))
-        return cls(members, np.empty(room), states, after, np.empty((room, parameters)), events, directions)
-
-    def chosen(self, which: Any) -> "_Log":
-        """Return a copy of some."""
-        return _Log(*(array[which].copy() for array in vars(self).values()))
-
-    @classmethod
-    def joined(cls, logs: Sequence["_Log"]) -> "_Log":
-        """Return several as one."""
-        return cls(*map(np.concatenate, zip(*(vars(log).values() for log in logs), strict=True)))
-
-
-@dataclass(frozen=True, eq=False)
 class _Watched(Adaptive):
     """Adaptive steps that are searched for events: in each lane one trajectory after the other."""
 
     work: _Work
-    logs: list[_Log] = field(default_factory=list)
+    logs: list[Log] = field(default_factory=list)
 
     @classmethod
     def plan(cls, lanes: Lanes, work: Work) -> tuple[float, dict[str, int], dict[str, Any]]:
@@ -186,13 +157,11 @@ class _Watched(Adaptive):
         end, parameters = float(self.work.result.t[-1]), self.lanes.parameters
         sign = 1.0 if end >= self.work.t0 else -1.0
         group, pairs = super().memory()
-        events = search_memory(search.events, search.functions, search.actions, pairs[0], end, sign)
-        room = min(HITS, room_for(max(dim, parameters)))
-        give_room(events, room)
-        log = _Log.empty(2 * width * room, dim, parameters)
-        group.point({f"log_{name}": array for name, array in vars(log).items()})
-        group.partials = [partial for _, partial in pairs]
-        group.log_room, group.search = 2 * width * room, events
+        events = search_memory(search.events, search.functions, search.actions, pairs[0])
+        events.last, events.sign = end, sign
+        group.room = 2 * width * min(HITS, room_for(max(dim, parameters)))
+        log = Log.of(events, group.room)
+        group.partials, group.search = [partial for _, partial in pairs], events
         group.renews = int(self.work.program.renews)
         for context, _ in pairs:
             context.events.code, context.events.memory = look.code(), events
@@ -200,11 +169,10 @@ class _Watched(Adaptive):
         return group, pairs, events, log
 
     def advance(self, memory: Any, budget: int) -> int:
-        group, _, _, log = memory
+        _, _, events, log = memory
         outcome = super().advance(memory, budget)
-        if group.logged:
-            self.logs.append(log.chosen(slice(group.logged)))
-            group.logged = 0
+        self.logs.append(log.chosen(slice(events.hits)))
+        events.hits = 0
         self.work.search.raise_what_is_no_failure()
         return outcome
 
@@ -217,7 +185,7 @@ class _Watched(Adaptive):
         """Return what has happened in every trajectory, by the events' names, in the order of integration."""
         events, actions = self.work.search.events, self.work.search.actions
         n, ahead = len(self.arrived), self.work.result.t[-1] >= self.work.t0
-        log = _Log.joined([_Log.empty(0, self.lanes.dim, self.lanes.parameters), *self.logs])
+        log = Log.joined(self.logs)
         log = log.chosen(np.lexsort((log.times if ahead else -log.times, log.members)))
         result = {}
         for i, name in enumerate(events):

@@ -134,6 +134,7 @@ class Group(Memory):
     events = Integer()  # how many; 0: nobody looks
     search = Pointer()  # a `Search`, which looks into one lane after another
     partials = Pointers()  # (lanes): a `Context` for partial steps of each lane
+    room = Integer()  # for occurrences in its log, of which a step of all lanes may take half
     renews = Integer()  # 1: other parameters change no velocities, and actions may set them in lanes
     function_values = Array("events", "lanes")  # of each lane, one after another: `Search.ends`,
     function_zeros = Array("events", "lanes")  # `Search.touched`,
@@ -146,13 +147,3 @@ class Group(Memory):
     start_state = Array("dim", "lanes")
     start_error = Array("dim", "lanes")
     stops = Array()  # (n): when an event has ended a trajectory
-    # What has happened, of all trajectories as it was found; arrays that the owner empties.
-    log_room = Integer()
-    logged = Integer()
-    log_members = Array(kind=int)
-    log_times = Array()
-    log_states = Array()
-    log_after = Array()
-    log_par = Array()
-    log_events = Array(kind=int)
-    log_directions = Array(kind=int)

@@ -5,18 +5,10 @@ from integrators.kernel.ensemble.group import ARRIVED, LEFT
 from integrators.kernel.inside.discontinuities import confirm_previous_step
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
+from integrators.kernel.step.sample import place
 from integrators.kernel.trajectory.vary import remaining
 
 context_at = view(Context)
-
-
-@compiled
-def state_index(ctx, d):
-    """Return where component d of (q, p), or of y, is in a state of a `Context`."""
-    if ctx.second == 0:
-        return d
-    rows = ctx.rows
-    return 8 * (d // 4) + 4 + d % 4 if d < rows else 8 * ((d - rows) // 4) + (d - rows) % 4
 
 
 @compiled
@@ -41,8 +33,8 @@ def fetch(group, lane, ctx):
     """Let the context of a lane have the solved step: its end, and the values of the field."""
     lanes, rows = group.lanes, group.rows
     for d in range(group.dim):
-        ctx.next_state[state_index(ctx, d)] = group.next_state[lanes * d + lane]
-        ctx.next_error[state_index(ctx, d)] = group.next_error[lanes * d + lane]
+        ctx.next_state[place(ctx, d)] = group.next_state[lanes * d + lane]
+        ctx.next_error[place(ctx, d)] = group.next_error[lanes * d + lane]
     for d in range(rows):
         for i in range(group.k):
             ctx.values[ctx.lanes * d + i] = group.values[lanes * (rows * i + d) + lane]

@@ -12,7 +12,7 @@ from math import log
 
 from integrators.kernel.context import DIVERGED, DONE
 from integrators.kernel.ensemble.group import LEFT, Group
-from integrators.kernel.ensemble.lane import clear, context_at, fetch, state_index, unload, write
+from integrators.kernel.ensemble.lane import clear, context_at, fetch, unload, write
 from integrators.kernel.ensemble.watch import has_room, keep_start, look_at_start, watch, watch_ordinary
 from integrators.kernel.inside.discontinuities import is_near_discontinuity, previous_end
 from integrators.kernel.native.attributes import view
@@ -23,6 +23,7 @@ from integrators.kernel.simd.memory import call_steps, put, splat8
 from integrators.kernel.step.begin import INFINITY, can_extrapolate
 from integrators.kernel.step.control import error_power, is_distinct
 from integrators.kernel.step.rule import FIRST_RATE, SMALLEST
+from integrators.kernel.step.sample import place
 from integrators.kernel.step.size import speed_of
 from integrators.kernel.trajectory.anew import reset
 from integrators.kernel.trajectory.vary import (
@@ -67,7 +68,7 @@ def load(group, lane):
     begin_attempts(ctx)
     reset(ctx, group.starts + group.dim * i)
     for d in range(group.dim):
-        group.state[lanes * d + lane] = ctx.state[state_index(ctx, d)]
+        group.state[lanes * d + lane] = ctx.state[place(ctx, d)]
         group.error[lanes * d + lane] = 0.0
     if group.times[group.count - 1] < group.start_time:
         ctx.controller.next_length = -ctx.controller.next_length
@@ -140,7 +141,7 @@ def catch_up(group, lane, ctx):
     ctx.counters.steps += int(group.since[lane])
     ctx.implicit.slow = 0
     for d in range(group.dim):
-        ctx.state[state_index(ctx, d)] = group.state[group.lanes * d + lane]
+        ctx.state[place(ctx, d)] = group.state[group.lanes * d + lane]
     for d in range(group.rows):
         put(discontinuities.previous_boundary_values, 8 * d, splat8(0.0))
         discontinuities.previous_boundary_values[8 * d] = group.ends[group.lanes * d + lane]

@@ -10,11 +10,11 @@ goes by itself.
 
 from integrators.kernel.context import ACCUMULATE, ACT, ACTS, BY_VALUES, DONE, GO_ON, HALTED, RENEW
 from integrators.kernel.ensemble.group import ACCUMULATES, BY_EVENT, LEFT
-from integrators.kernel.ensemble.lane import clear, context_at, fetch, state_index, unload, write, write_until
-from integrators.kernel.inside.actions import earlier
+from integrators.kernel.ensemble.lane import clear, context_at, fetch, unload, write, write_until
+from integrators.kernel.inside.actions import earlier, keep
 from integrators.kernel.inside.discontinuities import differs_at_an_end
 from integrators.kernel.inside.memory import START, TERMINAL, WHOLE, Search
-from integrators.kernel.inside.value import call_entry
+from integrators.kernel.inside.value import call_steps
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.parts.discontinuities import EXTRAPOLATED, NOTHING
@@ -22,6 +22,7 @@ from integrators.kernel.simd.memory import call_look, get, put
 from integrators.kernel.step.begin import INFINITY, set_factors
 from integrators.kernel.step.estimate import estimate
 from integrators.kernel.step.rule import FIRST_RATE
+from integrators.kernel.step.sample import place
 from integrators.kernel.trajectory.vary import begin_attempts
 
 search_at = view(Search)
@@ -30,7 +31,7 @@ search_at = view(Search)
 @compiled
 def has_room(group):
     """Whether a step of all lanes can note what happens in it."""
-    return group.log_room - group.logged >= group.lanes * search_at(group.search).room
+    return 2 * search_at(group.search).hits <= group.room
 
 
 @compiled
@@ -52,7 +53,7 @@ def turn_to(group, lane):
     search.ends, search.touched = group.function_values + first, group.function_zeros + first
     search.finite, search.happened = group.function_finite + first, group.happened + first
     search.recent = group.recent + 3 * first
-    search.hits = 0
+    search.member, search.room = group.member[lane], search.hits + group.room // (2 * group.lanes)
     return search
 
 
@@ -110,13 +111,10 @@ def watch_ordinary(group, lane):
 
 @compiled
 def look(group, lane, ctx):
-    """Look for events in the solved step of a lane, and note them; the outcome, DONE if nothing ends it."""
-    search = turn_to(group, lane)
+    """Look for events in the solved step of a lane; the outcome, DONE if nothing ends it."""
+    turn_to(group, lane)
     show(group, lane, ctx)
-    outcome = call_look(ctx.events.code, ctx, group.search)
-    if outcome == DONE:
-        note(group, lane, search, -1)
-    return outcome
+    return call_look(ctx.events.code, ctx, group.search)
 
 
 @compiled
@@ -142,31 +140,10 @@ def show(group, lane, ctx):
     """Let the context of a lane have the solved step as that of a single trajectory has it."""
     set_factors(ctx, ctx.h)
     for d in range(group.dim):
-        ctx.state[state_index(ctx, d)] = group.start_state[group.lanes * d + lane]
-        ctx.error[state_index(ctx, d)] = group.start_error[group.lanes * d + lane]
+        ctx.state[place(ctx, d)] = group.start_state[group.lanes * d + lane]
+        ctx.error[place(ctx, d)] = group.start_error[group.lanes * d + lane]
     ctx.solver.rate = group.rate[lane]
     ctx.solved, ctx.n, ctx.blocks.age = BY_VALUES, 0, 0
-
-
-@compiled
-def note(group, lane, search, last):
-    """Note what the search has found in a lane, up to occurrence ``last`` if that is not -1."""
-    dim, parameters = search.dim, search.parameters
-    for i in range(search.hits):
-        if last >= 0 and comes_before(search, last, i):
-            continue
-        j = group.logged
-        group.log_members[j] = group.member[lane]
-        group.log_times[j], group.log_events[j] = search.hit_times[i], search.hit_events[i]
-        group.log_directions[j] = search.hit_directions[i]
-        for d in range(dim):
-            group.log_states[dim * j + d] = search.hit_states[dim * i + d]
-        if search.actions[search.hit_events[i]]:
-            for d in range(dim):
-                group.log_after[dim * j + d] = search.hit_after[dim * i + d]
-            for d in range(parameters):
-                group.log_par[parameters * j + d] = search.hit_par[parameters * i + d]
-        group.logged = j + 1
 
 
 @compiled
@@ -180,7 +157,7 @@ def is_last(search, i):
     """Whether occurrence i is the one with which its event ends the trajectory."""
     event = search.hit_events[i]
     number = search.happened[event]  # those of this step are counted already
-    for j in range(search.hits):
+    for j in range(search.first, search.hits):
         if search.hit_events[j] == event and comes_before(search, i, j):
             number -= 1
     return search.limits[event] > 0 and number == search.limits[event]
@@ -190,7 +167,7 @@ def is_last(search, i):
 def find_last(search):
     """Return the first occurrence that ends the trajectory."""
     last = -1
-    for i in range(search.hits):
+    for i in range(search.first, search.hits):
         if is_last(search, i) and (last < 0 or comes_before(search, i, last)):
             last = i
     return last
@@ -199,9 +176,15 @@ def find_last(search):
 @compiled
 def end_by_event(group, lane, search, last):
     """End a trajectory with an occurrence; what would have happened after it has not."""
-    note(group, lane, search, last)
-    group.stops[group.member[lane]] = search.hit_times[last]
-    unload(group, lane, BY_EVENT + search.hit_events[last])
+    end, event, kept = search.hit_times[last], search.hit_events[last], search.first
+    for i in range(search.first, search.hits):
+        late = (search.hit_times[i] - end) * search.sign
+        if late < 0.0 or (late == 0.0 and i <= last):
+            keep(search, i, kept)
+            kept += 1
+    search.hits = kept
+    group.stops[group.member[lane]] = end
+    unload(group, lane, BY_EVENT + event)
 
 
 @compiled
@@ -210,29 +193,20 @@ def act(group, lane, ctx, search):
     controller, wanted = ctx.controller, ctx.controller.next_length
     if ctx.h != wanted and abs(controller.length_after) < abs(wanted):
         controller.length_after = wanted  # it was to end at a sample: what comes after need not be as short
-    iterations = ctx.counters.iterations
-    outcome = call_step(search, ACT)
-    group.iterations[lane] += float(ctx.counters.iterations - iterations)
+    outcome = call_steps(search, ACT, search.part, search.action_state)
     if outcome == RENEW and group.renews:
         renew(group, lane, ctx, search)
         outcome = DONE
     if outcome == DONE:
-        outcome = call_step(search, GO_ON)
+        outcome = call_steps(search, GO_ON, search.part, search.action_state)
     if outcome == HALTED and search.halted == TERMINAL:
         end_by_event(group, lane, search, find_last(search))
         return
-    note(group, lane, search, -1)
     if outcome == DONE:
         begin_again(group, lane, ctx)
         return
     group.stops[group.member[lane]] = ctx.t0
     unload(group, lane, ACCUMULATES if outcome == ACCUMULATE else LEFT)
-
-
-@compiled
-def call_step(search, operation):
-    """Call the compiled steps of single trajectories for the lane that the search looks into."""
-    return call_entry(search.steps, operation, search.own, search.partial, search.part, search.action_state)
 
 
 @compiled
@@ -248,7 +222,7 @@ def renew(group, lane, ctx, search):
 def begin_again(group, lane, ctx):
     """Let the trajectory of a lane begin at the state of its context."""
     for d in range(group.dim):
-        group.state[group.lanes * d + lane] = ctx.state[state_index(ctx, d)]
+        group.state[group.lanes * d + lane] = ctx.state[place(ctx, d)]
         group.error[group.lanes * d + lane] = 0.0
     clear(group, lane)
     group.rate[lane] = FIRST_RATE

@@ -1,9 +1,9 @@
 """Events that change the state: which comes first in a step, what it makes of the state, and where to go on.
 
-An adaptive step is solved anew to the first of them; of a fixed step, the partial step up to there, by which
-the event was found, is all that is taken. Its function is 0 there, and the sign that it has next, which
-rounding hides, is that of its slope along the trajectory from the new state: so the same zero is not found
-again. Where the slope is nothing too, the next derivative tells; see `inside.ahead`.
+Of the step, the part up to the first of them is taken, by which the event was found. Its function is 0 there,
+and the sign that it has next, which rounding hides, is that of its slope along the trajectory from the new
+state: so the same zero is not found again. Where the slope is nothing too, the next derivative tells; see
+`inside.ahead`.
 """
 
 from integrators.kernel.context import ACCUMULATE, ACTS, DONE, HALTED, RENEW
@@ -27,7 +27,7 @@ def earlier(search, i, j):
 
 
 @compiled
-def ends_step(search, before, i):
+def ends_step(search, i):
     """Whether the step ends at occurrence i: by an action, or as the last one of a terminal event."""
     event = search.hit_events[i]
     if search.actions[event]:
@@ -35,45 +35,61 @@ def ends_step(search, before, i):
     if search.limits[event] == 0:
         return False
     number = search.happened[event] + 1
-    for j in range(before, search.hits):
+    for j in range(search.first, search.hits):
         if search.hit_events[j] == event and earlier(search, j, i):
             number += 1
     return number == search.limits[event]
 
 
 @compiled
+def note_hit(search, t, event, direction, state, after):
+    """Note that an event happens, which makes ``after`` of a state; the parameters then are the new ones."""
+    i = search.hits
+    search.hit_members[i], search.hit_times[i] = search.member, t
+    search.hit_events[i], search.hit_directions[i] = event, direction
+    for d in range(search.dim):
+        search.hit_states[search.dim * i + d], search.hit_after[search.dim * i + d] = state[d], after[d]
+    for j in range(search.parameters):
+        search.hit_par[search.parameters * i + j] = search.new_par[j]
+    search.hits = i + 1
+
+
+@compiled
 def keep(search, outof, into):
     """Keep an occurrence under another index."""
+    search.hit_members[into] = search.hit_members[outof]
     search.hit_times[into] = search.hit_times[outof]
     search.hit_events[into] = search.hit_events[outof]
     search.hit_directions[into] = search.hit_directions[outof]
     for d in range(search.dim):
         search.hit_states[search.dim * into + d] = search.hit_states[search.dim * outof + d]
-        search.hit_after[search.dim * into + d] = search.hit_states[search.dim * outof + d]
+        search.hit_after[search.dim * into + d] = search.hit_after[search.dim * outof + d]
+    for i in range(search.parameters):
+        search.hit_par[search.parameters * into + i] = search.hit_par[search.parameters * outof + i]
 
 
 @compiled
-def end_step(ctx, search, before):
+def end_step(ctx, search):
     """Drop what does not happen, as the step ends before it; return ACTS if the step ends, or DONE."""
-    first, kept = -1, before
-    for i in range(before, search.hits):
+    first, kept = -1, search.first
+    for i in range(search.first, search.hits):
         if (search.hit_times[i] - search.last) * search.sign > 0.0:
             continue
         keep(search, i, kept)
         kept += 1
     search.hits = kept
-    for i in range(before, search.hits):
-        if ends_step(search, before, i) and (first < 0 or earlier(search, i, first)):
+    for i in range(search.first, search.hits):
+        if ends_step(search, i) and (first < 0 or earlier(search, i, first)):
             first = i
     for event in range(search.count):
         search.due[event] = 0
     if first >= 0:
-        end, kept = search.hit_times[first], before
+        end, kept = search.hit_times[first], search.first
         for d in range(search.dim):
             search.action_state[d] = search.hit_states[search.dim * first + d]
         ctx.events.time = end
         close = SIMULTANEOUS * abs(end)
-        for i in range(before, search.hits):
+        for i in range(search.first, search.hits):
             event, late = search.hit_events[i], (search.hit_times[i] - end) * search.sign
             if late > close:
                 continue
@@ -87,7 +103,7 @@ def end_step(ctx, search, before):
                 if late >= -close:
                     search.due[event] = NOTED
         search.hits = kept
-    for i in range(before, search.hits):
+    for i in range(search.first, search.hits):
         search.happened[search.hit_events[i]] += 1
     return DONE if first < 0 else ACTS
 
@@ -136,12 +152,9 @@ def has_new_parameters(ctx, search):
 @compiled
 def change_state(ctx, search):
     """Note what happens at the end of the step, and change the state; DONE, RENEW, ACCUMULATE or HALTED."""
-    if ctx.varying == 0:
-        put_state(ctx, search.action_state)
+    put_state(ctx, search.action_state)
     for d in range(search.dim):
-        if ctx.varying == 0:
-            search.step_state[d] = search.action_state[d]
-        search.new_state[d] = search.step_state[d]
+        search.new_state[d] = search.step_state[d] = search.action_state[d]
     for i in range(search.parameters):
         search.new_par[i] = ctx.par[i]
     for event in range(search.count):
@@ -153,9 +166,6 @@ def change_state(ctx, search):
             continue
         if search.actions[event] and note_time(ctx, search, event):
             return ACCUMULATE
-        i = search.hits
-        search.hit_times[i], search.hit_events[i] = search.time, event
-        search.hit_directions[i] = search.due_directions[event]
         search.happened[event] += 1
         if search.happened[event] == search.limits[event]:
             halted = True
@@ -163,12 +173,9 @@ def change_state(ctx, search):
             search.halted = make(ctx, search, event)
             if search.halted != GOING:
                 return HALTED
-        for d in range(search.dim):
-            search.hit_states[search.dim * i + d] = search.step_state[d]
-            search.hit_after[search.dim * i + d] = search.new_state[d]
-        for j in range(search.parameters):
-            search.hit_par[search.parameters * i + j] = search.new_par[j]
-        search.hits = i + 1
+        note_hit(
+            search, search.time, event, search.due_directions[event], search.step_state, search.new_state
+        )
     if halted:
         search.halted = TERMINAL
         return HALTED

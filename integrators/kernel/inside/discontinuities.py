@@ -11,6 +11,7 @@ from integrators.kernel.step.coefficients import coefficient
 from integrators.kernel.step.control import RETREAT, SHORTEST, SHRINK, TIME_TOLERANCE
 from integrators.kernel.step.estimate import NARROWEST, SMOOTH_GAP, block_size, estimate, is_gap
 from integrators.kernel.step.rounding import known_noise, measure_noise, measure_noise_behind
+from integrators.kernel.step.sample import put_in_lanes
 from integrators.kernel.step.sums import time_after
 
 BREAKPOINT_OFFSET = 1e-12  # part of a step: as near to a breakpoint the field is looked at
@@ -154,24 +155,18 @@ def look_at_ends(ctx):
     discontinuities, surfaces = ctx.discontinuities, ctx.surfaces
     h, t = abs(ctx.h), ctx.t0
     discontinuities.undone = 0
-    rows, lanes, second = ctx.rows, ctx.lanes, ctx.second
+    rows, lanes = ctx.rows, ctx.lanes
     # Stages at both ends, in memory that the solved step does not need any more; idle lanes repeat the last.
     stages, times, values = ctx.scratch.old_stages, ctx.times, ctx.scratch.sums
     inside = max(BREAKPOINT_OFFSET * h, 2.0 * SHORTEST * abs(t))
     sign = 1.0 if ctx.h > 0.0 else -1.0
-    times[0] = t
+    start = t
     if discontinuities.boundary == START:
-        times[0] += sign * max(inside, discontinuities.resolution)
+        start += sign * max(inside, discontinuities.resolution)
     end, _ = time_after(t, ctx.time_low, ctx.h)  # which is not beyond that of the integration by rounding
-    for lane in range(1, lanes):
-        times[lane] = end
-        if ends_at_break(ctx):
-            times[lane] -= sign * max(inside, ctx.controller.resolution)
-    for d in range(rows):
-        index = 8 * (d // 4) + 4 + d % 4 if second else d
-        stages[lanes * d] = ctx.state[index]
-        for lane in range(1, lanes):
-            stages[lanes * d + lane] = ctx.next_state[index]
+    if ends_at_break(ctx):
+        end -= sign * max(inside, ctx.controller.resolution)
+    put_in_lanes(ctx, times, stages, start, end, ctx.next_state)
     call_field(ctx.field, times, stages, ctx.par, values)
     ctx.counters.evaluations += 2
     # Unseen for no longer than the part of the step before the first node.
@@ -299,15 +294,9 @@ def confirm_previous_step(ctx):
         return True
     if controller.breaks == 1 and abs(controller.stop - ctx.t0) <= TIME_TOLERANCE * abs(controller.stop):
         return True
-    rows, lanes, second = ctx.rows, ctx.lanes, ctx.second
-    stages, times, values = ctx.scratch.old_stages, ctx.times, ctx.scratch.sums
-    for lane in range(lanes):
-        times[lane] = ctx.t0
-    for d in range(rows):
-        index = 8 * (d // 4) + 4 + d % 4 if second else d
-        for lane in range(lanes):
-            stages[lanes * d + lane] = ctx.state[index]
-    call_field(ctx.field, times, stages, ctx.par, values)
+    stages, times = ctx.scratch.old_stages, ctx.times
+    put_in_lanes(ctx, times, stages, ctx.t0, ctx.t0, ctx.state)
+    call_field(ctx.field, times, stages, ctx.par, ctx.scratch.sums)
     ctx.counters.evaluations += 1
     ctx.discontinuities.boundary = SEEN
     ctx.estimate.measured = ctx.estimate.noisy

@@ -5,6 +5,7 @@ from integrators.kernel.inside.actions import (
     begin_anew,
     change_state,
     end_step,
+    note_hit,
 )
 from integrators.kernel.inside.ahead import way_ahead
 from integrators.kernel.inside.chebyshev import keep_samples, keeps_away, refine, suspect, transform
@@ -68,23 +69,23 @@ def entry(address, memory):
     if not set_end(ctx, search):
         search.halted = UNSOLVABLE
         return HALTED
-    before = search.hits
+    search.first = search.hits
     for event in range(search.count):
         search.touched_before[event] = search.touched[event]
     search.halted = look(ctx, search)
     if ctx.events.act and search.halted == GOING and search.room - search.hits < search.count:
         search.halted = FULL
     if search.halted != GOING:
-        search.hits = before  # what is known of a step is all or nothing
+        search.hits = search.first  # what is known of a step is all or nothing
         for event in range(search.count):
             search.touched[event] = search.touched_before[event]
         return HALTED
     if ctx.events.act:
-        outcome = end_step(ctx, search, before)
+        outcome = end_step(ctx, search)
         if outcome == DONE:
             keep_ends(search)
         return outcome
-    return close(search, before)
+    return close(search)
 
 
 @compiled
@@ -144,10 +145,10 @@ def begin(ctx, search):
 
 
 @compiled
-def close(search, before):
+def close(search):
     """Count what has happened; return HALTED at the last occurrence of a terminal event."""
     keep_ends(search)
-    for i in range(before, search.hits):
+    for i in range(search.first, search.hits):
         event = search.hit_events[i]
         search.happened[event] += 1
         if search.happened[event] == search.limits[event]:
@@ -325,14 +326,8 @@ def note(ctx, search, x, direction):
         return True
     if search.directions[event] != 0 and search.directions[event] != direction:
         return True
-    i = search.hits
-    if i == search.room:
+    if search.hits == search.room:
         return False
     state = state_at(ctx, search, t)
-    for d in range(search.dim):
-        search.hit_states[search.dim * i + d] = state[d]
-    search.hit_times[i] = t
-    search.hit_events[i] = event
-    search.hit_directions[i] = direction
-    search.hits = i + 1
+    note_hit(search, t, event, direction, state, state)
     return True

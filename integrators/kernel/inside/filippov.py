@@ -14,6 +14,7 @@ from integrators.kernel.parts.surfaces import AT_STEP_END
 from integrators.kernel.simd.memory import call_field
 from integrators.kernel.step.control import INFINITY
 from integrators.kernel.step.rounding import rounding_of
+from integrators.kernel.step.sample import place, put_in_lanes, velocity
 
 NEAR, FAR = 2.0**-28, 2.0**-20  # of how far states move in a step: distances from the surface
 STAYS = 0.5  # of a speed at the larger distance is left at the smaller one, if it does not vanish
@@ -34,7 +35,7 @@ def slides(ctx):
         return False
     set_moves(ctx)
     for i in range(1, 1 + surfaces.count):
-        set_lanes(ctx, surfaces.times, ctx.t0, ctx.scratch.sums)
+        put_in_lanes(ctx, surfaces.times, ctx.scratch.sums, ctx.t0, ctx.t0, ctx.state)
         call_field(surfaces.code, surfaces.times, ctx.scratch.sums, ctx.par, surfaces.between)
         g = surfaces.between[ctx.lanes * i]
         if (g == 0.0 or i == surfaces.row) and slides_along(ctx, i, g):
@@ -43,32 +44,11 @@ def slides(ctx):
 
 
 @compiled
-def component(ctx, d):
-    """Return component d of the state that the field is a function of."""
-    return ctx.state[8 * (d // 4) + 4 + d % 4] if ctx.second else ctx.state[d]
-
-
-@compiled
-def velocity(ctx, d):
-    """Return the rate of that component, in second-order form."""
-    return ctx.factors.velocity[d] * ctx.state[8 * (d // 4) + d % 4]
-
-
-@compiled
-def set_lanes(ctx, times, t, states):
-    """Put a time and the present state to all lanes."""
-    for lane in range(ctx.lanes):
-        times[lane] = t
-        for d in range(ctx.rows):
-            states[ctx.lanes * d + lane] = component(ctx, d)
-
-
-@compiled
 def set_moves(ctx):
     """Set in `Surfaces.state` how far each component moves in a step, which is what is near a surface."""
     surfaces, lanes, values, states = ctx.surfaces, ctx.lanes, ctx.values, ctx.scratch.sums
     moves, h = surfaces.state, abs(ctx.controller.next_length)
-    set_lanes(ctx, surfaces.times, ctx.t0, states)
+    put_in_lanes(ctx, surfaces.times, states, ctx.t0, ctx.t0, ctx.state)
     call_field(ctx.field, surfaces.times, states, ctx.par, values)
     for d in range(ctx.rows):
         slope = abs(values[lanes * d])
@@ -77,7 +57,7 @@ def set_moves(ctx):
         else:
             before = abs(previous_end(ctx, d)) if surfaces.on_surface == AT_STEP_END else 0.0
             moves[d] = h * max(slope, before)
-        moves[d] += RESOLVED * abs(component(ctx, d))
+        moves[d] += RESOLVED * abs(ctx.state[place(ctx, d)])
     ctx.counters.evaluations += 1
     if ctx.second:
         return
@@ -99,16 +79,16 @@ def set_gradient(ctx, i, g):
     moves, gradient = surfaces.state, surfaces.state + ctx.padded
     for first in range(0, rows, lanes):
         count = min(lanes, rows - first)
-        set_lanes(ctx, surfaces.times, ctx.t0, states)
+        put_in_lanes(ctx, surfaces.times, states, ctx.t0, ctx.t0, ctx.state)
         for lane in range(count):
             states[lanes * (first + lane) + lane] += DIFFERENCE * moves[first + lane]
         call_field(surfaces.code, surfaces.times, states, ctx.par, surfaces.between)
         for lane in range(count):
             d = first + lane
-            moved = states[lanes * d + lane] - component(ctx, d)
+            moved = states[lanes * d + lane] - ctx.state[place(ctx, d)]
             gradient[d] = (surfaces.between[lanes * i + lane] - g) / moved if moved != 0.0 else 0.0
     change = DIFFERENCE * abs(ctx.controller.next_length)
-    set_lanes(ctx, surfaces.times, ctx.t0 + change, states)
+    put_in_lanes(ctx, surfaces.times, states, ctx.t0 + change, ctx.t0 + change, ctx.state)
     call_field(surfaces.code, surfaces.times, states, ctx.par, surfaces.between)
     return (surfaces.between[lanes * i] - g) / (surfaces.times[0] - ctx.t0)
 
@@ -122,13 +102,13 @@ def slides_along(ctx, i, g):
     largest, square, terms = 0.0, 0.0, 0.0
     for d in range(rows):
         largest = max(largest, abs(moves[d] * gradient[d]))
-        terms += abs(gradient[d] * component(ctx, d))
+        terms += abs(gradient[d] * ctx.state[place(ctx, d)])
     if not 0.0 < largest < INFINITY:
         return False
     for d in range(rows):
         square += (moves[d] * gradient[d] / largest) ** 2
     size, rounding = square**0.5 * largest, rounding_of(terms)
-    set_lanes(ctx, surfaces.times, ctx.t0, states)
+    put_in_lanes(ctx, surfaces.times, states, ctx.t0, ctx.t0, ctx.state)
     for d in range(rows):
         part = moves[d] * (moves[d] * gradient[d] / size)
         states[lanes * d + NEAR_ABOVE] += (NEAR - g / size) * part

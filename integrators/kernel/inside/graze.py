@@ -4,6 +4,8 @@ No node sees such a contact, but the distance from the surface does not fall to 
 minimum at the nodes beside it. There the polynomial of the step is looked at more closely.
 """
 
+from integrators.kernel.inside.surfaces import distance_at
+from integrators.kernel.inside.zero import change_of_sign, deepest
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.parts.surfaces import MOST_SIDES
 from integrators.kernel.simd.memory import call_field
@@ -11,7 +13,7 @@ from integrators.kernel.step.estimate import block_size
 from integrators.kernel.step.sample import interpolate
 
 DEEPER = 2.0  # times as far as a parabola may fall between its points, a distance may fall
-LOOKS = 3  # at as many times as there are lanes: the last are a thousandth of the nodes' distance apart
+NEAREST = 1e-10  # of a step: how well it is known where a distance is smallest, or 0
 # Times the coefficients that the polynomial leaves out: between nodes it is no farther from a smooth field.
 BESIDE = 10.0
 
@@ -59,56 +61,41 @@ def may_vanish(before, here, after, back, ahead):
 @compiled
 def touches(ctx, i, low, high):
     """Whether surface i is touched between two parts of the step by more than is negligible."""
-    surfaces = ctx.surfaces
-    lanes, values = ctx.lanes, surfaces.between
-    for _ in range(LOOKS):
-        width = (high - low) / (lanes - 1)
-        set_states(ctx, low, width)
-        call_field(surfaces.code, surfaces.times, ctx.scratch.sums, ctx.par, values)
-        nearest = 0
-        for lane in range(lanes):
-            if values[lane] != surfaces.values[0]:
-                return matters(ctx, low, width)
-            if abs(values[lanes * i + lane]) < abs(values[lanes * i + nearest]):
-                nearest = lane
-        if nearest == 0 or nearest == lanes - 1:
-            return False
-        here = lanes * i + nearest
-        if not may_vanish(abs(values[here - 1]), abs(values[here]), abs(values[here + 1]), width, width):
-            return False
-        low, high = low + width * (nearest - 1), low + width * (nearest + 1)
-    return False
+    x = deepest(distance_at, ctx, i, low, high, -1.0, NEAREST)
+    if not distance_at(ctx, i, x) < 0.0:
+        return False
+    return matters(ctx, border(ctx, i, low, x), border(ctx, i, x, high))
 
 
 @compiled
-def set_states(ctx, low, width):
-    """Set states of the polynomial, a lane each, at equidistant parts of the step."""
-    lanes, rows, state = ctx.lanes, ctx.rows, ctx.surfaces.state
+def border(ctx, i, low, high):
+    """Return where surface i lies between two parts of the step."""
+    at_low, at_high = distance_at(ctx, i, low), distance_at(ctx, i, high)
+    low, high, _, _ = change_of_sign(distance_at, ctx, i, low, high, at_low, at_high, low, 0.0, NEAREST)
+    return 0.5 * (low + high)
+
+
+@compiled
+def matters(ctx, low, high):
+    """Whether between two parts of the step the field is farther from its polynomial than is negligible."""
+    lanes, rows, gammas, state = ctx.lanes, ctx.rows, ctx.estimate.coefficients, ctx.surfaces.state
+    width = (high - low) / lanes
     for lane in range(lanes):
-        c = low + width * lane
+        c = low + width * (lane + 0.5)
         interpolate(ctx, c, state)
         ctx.surfaces.times[lane] = ctx.t0 + c * ctx.h
         for d in range(rows):
             ctx.scratch.sums[lanes * d + lane] = state[d]
-
-
-@compiled
-def matters(ctx, low, width):
-    """Whether beyond the surface the field is farther from its polynomial than is negligible."""
-    surfaces = ctx.surfaces
-    lanes, sides, gammas = ctx.lanes, surfaces.between, ctx.estimate.coefficients
     values = ctx.stages  # the solved step does not need them any more
-    call_field(ctx.field, surfaces.times, ctx.scratch.sums, ctx.par, values)
+    call_field(ctx.field, ctx.surfaces.times, ctx.scratch.sums, ctx.par, values)
     ctx.counters.evaluations += lanes
-    # Unseen for no longer than the states that are looked at.
-    least = ctx.discontinuities.negligible / (abs(ctx.h) * width * (lanes - 1))
-    for d in range(ctx.rows):
+    least = ctx.discontinuities.negligible / (abs(ctx.h) * (high - low))
+    for d in range(rows):
         i = 8 * d
         smooth = BESIDE * max(max(gammas[i + 4], gammas[i + 5]), max(gammas[i + 6], gammas[i + 7]))
         most = max(smooth, least * block_size(ctx, ctx.blocks.of_row[d]))
         for lane in range(lanes):
-            far = abs(values[lanes * d + lane] - polynomial(ctx, d, low + width * lane))
-            if sides[lane] != surfaces.values[0] and far > most:
+            if abs(values[lanes * d + lane] - polynomial(ctx, d, low + width * (lane + 0.5))) > most:
                 return True
     return False
 

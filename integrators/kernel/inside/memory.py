@@ -60,9 +60,12 @@ class Search(Memory):
     iterations = Integer()
     partial_steps = Integer()
 
-    # --- what has happened; arrays that the owner empties, and makes larger ---
+    # --- what has happened; arrays that the owner empties, and makes larger; see `search.Log` ---
     room = Integer()
     hits = Integer()
+    first = Integer()  # the first of this look
+    member = Integer()  # of which trajectory, where there are many
+    hit_members = Array(kind=int)
     hit_times = Array()
     hit_states = Array()
     hit_after = Array()  # states that the events' actions have made of these

@@ -1,6 +1,7 @@
 """The search for events of one trajectory, as Python sees it."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -34,6 +35,7 @@ from integrators.protocol import Array, Status, UserError
 LOW = 4  # below this degree of the method's polynomial one term more is looked for; see `series`
 LEAST, MOST = 8, 16  # samples in a step to begin with; more where these do not show the function
 HITS, NUMBERS = 1024, 1 << 17  # occurrences, and components of their states, that are kept until Python asks
+FRESH = ("happened", "due", "due_directions")  # all else is set at the start, or before it is read
 LASTING = ("ends", "touched", "finite", "happened", "recent", "due", "due_directions", "action_state")
 
 
@@ -62,17 +64,9 @@ def _tables() -> tuple[Array, tuple[Array, ...]]:
 
 def search_memory(
     events: Mapping[str, Event], functions: Sequence[EventFunction], actions: Mapping[str, Action],
-    contexts: tuple[Context, Context], end: float, sign: float,
+    contexts: tuple[Context, Context],
 ) -> Search:  # fmt: skip
-    """Return the memory of a search, without room for what it finds.
-
-    Parameters
-    ----------
-    events, functions, actions, contexts, end
-        As of `KernelSearch`.
-    sign : {1.0, -1.0}
-        The direction of time.
-    """
+    """Return the memory of a search, without room for what it finds; the arguments are those of it."""
     own, partial = contexts
     dim, n_par = own.shape.dim, own.par.size
     degree = 1 << (min(max(2 * own.s, LEAST), MOST) - 1).bit_length()
@@ -80,7 +74,6 @@ def search_memory(
     numbers = {
         "count": len(events), "dim": dim, "degree": degree, "chunks": degree // 8, "terms": terms,
         "groups": -(-terms // 8), "parameters": n_par, "made_rows": 1 + dim + n_par,
-        "last": end, "sign": sign,
     }  # fmt: skip
     cosines, transforms = _tables()
     memory = Search(numbers, {"cosines": cosines})
@@ -101,18 +94,37 @@ def room_for(numbers: int) -> int:
     return max(8, min(HITS, NUMBERS // numbers))
 
 
-def give_room(memory: Search, room: int) -> tuple[NDArray[Any], ...]:
-    """Give a search room for so many occurrences; return it as `EventLog.take` has it."""
-    times, states, after = np.empty(room), *np.empty((2, room, memory.dim))
-    (events, directions), par = np.empty((2, room), dtype=np.int64), np.empty((room, memory.parameters))
-    memory.point(
-        {
-            "hit_times": times, "hit_states": states, "hit_after": after, "hit_par": par,
-            "hit_events": events, "hit_directions": directions,
-        }
-    )  # fmt: skip
-    memory.room = room
-    return times, states, after, events, directions, par
+@dataclass(frozen=True, eq=False)
+class Log:
+    """Occurrences of events in the order in which they were found: room for them, or a part of it."""
+
+    times: Array
+    states: Array
+    after: Array
+    events: NDArray[np.int64]
+    directions: NDArray[np.int64]
+    par: Array
+    members: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, memory: Search, room: int) -> "Log":
+        """Give a search room for so many, and return it."""
+        states, after = np.empty((2, room, memory.dim))
+        events, directions, members = np.empty((3, room), np.int64)
+        par = np.empty((room, memory.parameters))
+        log = cls(np.empty(room), states, after, events, directions, par, members)
+        memory.point({f"hit_{name}": array for name, array in vars(log).items()})
+        memory.room = room
+        return log
+
+    def chosen(self, which: Any) -> "Log":
+        """Return a copy of some."""
+        return Log(*(array[which].copy() for array in vars(self).values()))
+
+    @classmethod
+    def joined(cls, logs: Sequence["Log"]) -> "Log":
+        """Return several as one."""
+        return cls(*map(np.concatenate, zip(*(vars(log).values() for log in logs), strict=True)))
 
 
 class KernelSearch:
@@ -130,6 +142,8 @@ class KernelSearch:
         Of the trajectory, and for partial steps; the solver of steps need not be there.
     end : float
         The time up to which is looked.
+    memory : Search, optional
+        That of a search for the same with these contexts, which is over.
 
     Raises
     ------
@@ -139,12 +153,17 @@ class KernelSearch:
 
     def __init__(
         self, events: Mapping[str, Event], functions: Sequence[EventFunction], actions: Mapping[str, Action],
-        contexts: tuple[Context, Context], end: float,
+        contexts: tuple[Context, Context], end: float, memory: Search | None = None,
     ):  # fmt: skip
         self._functions, self._actions = functions, actions
         self._context, _ = contexts
         self._dim, sign = self._context.shape.dim, 1.0 if end >= self._context.t0 else -1.0
-        self._memory = memory = search_memory(events, functions, actions, contexts, end, sign)
+        memory = search_memory(events, functions, actions, contexts) if memory is None else memory
+        self._memory = memory
+        memory.last, memory.sign = end, sign
+        memory.hits = memory.evaluations = memory.iterations = memory.partial_steps = 0
+        for name in FRESH:
+            getattr(memory, name)[:] = 0
         self._hits = EventLog(events, memory.sign, self._dim, memory.parameters)
         self._make_room(room_for(max(self._dim, memory.parameters)))
         self.trouble: tuple[Status, str, Exception | None] | None = None
@@ -155,7 +174,7 @@ class KernelSearch:
         self._context.events.act, self._context.events.acted = int(bool(actions)), -memory.sign * np.inf
 
     def _make_room(self, room: int) -> None:
-        self._found = give_room(self._memory, room)
+        self._log = Log.of(self._memory, room)
 
     def _look(self, mode: int) -> int:
         self._memory.mode = mode
@@ -218,7 +237,8 @@ class KernelSearch:
     def hits(self) -> EventLog:
         """What has happened."""
         n, self._memory.hits = self._memory.hits, 0
-        self._hits.take(*(array[:n] for array in self._found))
+        log = self._log.chosen(slice(n))
+        self._hits.take(log.times, log.states, log.after, log.events, log.directions, log.par)
         return self._hits
 
     def resume(self, counts: Sequence[int], directions: Sequence[int], *, again: bool) -> None:

@@ -14,7 +14,7 @@ from integrators.kernel.parts.surfaces import AT_ORIGIN, END_ACROSS, MOST_SIDES,
 from integrators.kernel.simd.memory import call_field
 from integrators.kernel.step.begin import INFINITY
 from integrators.kernel.step.control import is_distinct
-from integrators.kernel.step.sample import interpolate
+from integrators.kernel.step.sample import interpolate, put_in_lanes, velocity
 
 # What comes of a step that crosses a surface, or was to end on one: judged like all others; tried again with
 # `Controller.next_length`; it ends on the surface.
@@ -58,19 +58,13 @@ def first_point(ctx):
 def look_across(ctx, outcome):
     """Set and return `Surfaces.across`: the first node on another side than the start, if any."""
     surfaces = ctx.surfaces
-    lanes, rows, second = ctx.lanes, ctx.rows, ctx.second
+    lanes = ctx.lanes
     size = lanes * ctx.padded
     for call in range(ctx.calls):
         values = surfaces.values + lanes * MOST_SIDES * call
         call_field(surfaces.code, ctx.times + lanes * call, ctx.stages + size * call, ctx.par, values)
     times, ends = surfaces.times, ctx.scratch.sums
-    for lane in range(lanes):
-        times[lane] = ctx.t0 + (ctx.h if lane else 0.0)
-    for d in range(rows):
-        index = 8 * (d // 4) + 4 + d % 4 if second else d
-        ends[lanes * d] = ctx.scratch.row_state[d]
-        for lane in range(1, lanes):
-            ends[lanes * d + lane] = ctx.next_state[index]
+    put_in_lanes(ctx, times, ends, ctx.t0, ctx.t0 + ctx.h, ctx.next_state)
     call_field(surfaces.code, times, ends, ctx.par, surfaces.ends)
     surfaces.across = NO_SURFACE
     here = value_at(ctx, 0, first_point(ctx))
@@ -189,11 +183,12 @@ def part_to_surface(ctx):
             surfaces.row = row
     if surfaces.row == 0:
         return 0.0
-    here = value_at(ctx, 0, first_point(ctx))
+    row = surfaces.row
     before, at = ctx.tables.nodes[ctx.k - 1], 1.0
-    value_before, value = distance_at(ctx, before, here), distance_at(ctx, at, here)
+    value_before, value = distance_at(ctx, row, before), distance_at(ctx, row, at)
     if value_before == 0.0:  # stages of a longer step were beyond this one: in fact it is 0 all along
         return 0.0
+    # Secants without a bracket: a surface that is only touched has the same side before and after.
     for _ in range(SECANTS):
         if value == 0.0:
             break
@@ -207,7 +202,7 @@ def part_to_surface(ctx):
         if after == at:
             break
         before, value_before = at, value
-        at, value = after, distance_at(ctx, after, here)
+        at, value = after, distance_at(ctx, row, after)
     return (
         at
         if is_number(value) and at > 0.5 and not (at == MOST_EXTRAPOLATED and value > value_before)
@@ -216,8 +211,8 @@ def part_to_surface(ctx):
 
 
 @compiled
-def distance_at(ctx, c, here):
-    """Return the distance from `Surfaces.row` at part c of the step, negative beyond it."""
+def distance_at(ctx, row, c):
+    """Return a distance at part c of the step, negative beyond a surface."""
     surfaces = ctx.surfaces
     lanes, state = ctx.lanes, surfaces.state
     interpolate(ctx, c, state)
@@ -226,8 +221,8 @@ def distance_at(ctx, c, here):
         for d in range(ctx.rows):
             ctx.scratch.sums[lanes * d + lane] = state[d]
     call_field(surfaces.code, surfaces.times, ctx.scratch.sums, ctx.par, surfaces.between)
-    size = abs(surfaces.between[lanes * surfaces.row])
-    return size if surfaces.between[0] == here else -size
+    size = abs(surfaces.between[lanes * row])
+    return size if surfaces.between[0] == value_at(ctx, 0, first_point(ctx)) else -size
 
 
 @compiled
@@ -237,21 +232,11 @@ def find_surface(ctx):
     surfaces.on_surface = surfaces.reached = surfaces.row = surfaces.locating = 0
     if surfaces.code == 0:
         return
-    spread_state(ctx, ctx.t0)
+    put_in_lanes(ctx, surfaces.times, ctx.scratch.sums, ctx.t0, ctx.t0, ctx.state)
     call_field(surfaces.code, surfaces.times, ctx.scratch.sums, ctx.par, surfaces.between)
     for i in range(1, 1 + surfaces.count):
         if surfaces.between[ctx.lanes * i] == 0.0:
             surfaces.on_surface, surfaces.row = AT_ORIGIN, i
-
-
-@compiled
-def spread_state(ctx, t):
-    """Put the present state and a time to all lanes."""
-    lanes, second = ctx.lanes, ctx.second
-    for lane in range(lanes):
-        ctx.surfaces.times[lane] = t
-        for d in range(ctx.rows):
-            ctx.scratch.sums[lanes * d + lane] = ctx.state[8 * (d // 4) + 4 + d % 4 if second else d]
 
 
 @compiled
@@ -260,13 +245,14 @@ def leave(ctx):
     surfaces, scratch = ctx.surfaces, ctx.scratch
     lanes, rows, values, h = ctx.lanes, ctx.rows, ctx.values, ctx.controller.next_length
     move = NUDGE * h
-    spread_state(ctx, ctx.t0 + move)
+    later = ctx.t0 + move
+    put_in_lanes(ctx, surfaces.times, scratch.sums, later, later, ctx.state)
     if ctx.second == 0 and surfaces.on_surface == AT_ORIGIN:
         call_field(ctx.field, surfaces.times, scratch.sums, ctx.par, values)
         ctx.counters.evaluations += 1
     for d in range(rows):
         if ctx.second:
-            slope = ctx.factors.velocity[d] * ctx.state[8 * (d // 4) + d % 4]
+            slope = velocity(ctx, d)
         else:
             slope = values[lanes * d] if surfaces.on_surface == AT_ORIGIN else previous_end(ctx, d)
         for lane in range(lanes):

@@ -1,33 +1,19 @@
 """A function at any point of a step: exact, at the end of a partial step of the method itself."""
 
-from llvmlite import ir
-from numba import types
-
 from integrators.kernel.context import DONE, PART, Context
 from integrators.kernel.inside.memory import CACHED
 from integrators.kernel.inside.sample import NAN, function, noise_of, part_at, time_at
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
-from integrators.kernel.simd.emit import INTEGER
-from integrators.kernel.simd.lanes import intrinsic
-from integrators.kernel.simd.views import DOUBLES
+from integrators.kernel.simd.memory import call_entry
 
 context = view(Context)
 
 
-@intrinsic
-def call_entry(typing, steps, operation, own, partial, part, out):
-    """Call the compiled steps; see `integrators.kernel.trajectory.entry`."""
-
-    def generate(context, builder, sig, args):
-        function, operation, own, partial, part, out = args
-        none = ir.Constant(INTEGER, 0)
-        part, out = (builder.ptrtoint(array, INTEGER) for array in (part, out))
-        words = [operation, own, partial, none, none, none, none, part, none, out, none]
-        kind = ir.FunctionType(INTEGER, [INTEGER] * len(words))
-        return builder.call(builder.inttoptr(function, kind.as_pointer()), words)
-
-    return types.int64(*[types.int64] * 4, DOUBLES, DOUBLES), generate
+@compiled
+def call_steps(search, operation, part, out):
+    """Let the compiled steps do an operation on the trajectory; see `integrators.kernel.trajectory.entry`."""
+    return call_entry(search.steps, operation, search.own, search.partial, 0, 0, 0, 0, part, 0, out, 0)
 
 
 @compiled
@@ -55,7 +41,7 @@ def state_at(ctx, search, t):
     search.cache_times[i] = t
     search.part[0] = part_at(search, t)
     partial = context(search.partial)
-    outcome = call_entry(search.steps, PART, search.own, search.partial, search.part, state)
+    outcome = call_steps(search, PART, search.part, state)
     # A partial step that only the implicit solver would solve is none: steps do not change.
     ctx.implicit.wanted = 0
     search.iterations += partial.counters.iterations

@@ -130,17 +130,22 @@ BEYOND_END = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)  # of the stretch: how far beyond it
 
 
 @compiled
-def direction_at_end(ctx, search, before):
-    """Return the direction of a zero at the very end: by the sign of the function just beyond it."""
+def add_zero_at_end(ctx, search, x, before):
+    """Note a zero at the very end, after a sign; what follows begins with the sign just beyond it."""
     raised, after = search.raised, 0
     for distance in BEYOND_END:
-        x = 1.0 + max(distance, 100.0 * search.resolution)
-        value = value_at(ctx, search, x)
-        if abs(value) > noise_at(ctx, search, x):
+        beyond = 1.0 + max(distance, 100.0 * search.resolution)
+        value = value_at(ctx, search, beyond)
+        if abs(value) > noise_at(ctx, search, beyond):
             after = sign(value)
             break
     search.raised = raised  # a function may go no farther than the integration
-    return 0 if after == before else -before
+    if after == before:
+        add_zero(search, x, 0)
+        return
+    add_zero(search, x, -before)
+    search.end_value = -TINY * before
+    search.sampled[FINEST * search.event + search.degree - 1] = search.end_value
 
 
 @compiled
@@ -164,13 +169,10 @@ def mark_low(ctx, search, low, way):
     if sign(value) == -way and abs(value) > noise:
         mark(search, x, -way)
     elif abs(value) <= noise or abs(value) <= blur(ctx, search, x):
-        direction = 0
         if low == search.n - 1 and x >= 1.0 - BESIDE:
-            direction = direction_at_end(ctx, search, way)
-        add_zero(search, x, direction)
-        if direction != 0:  # what follows begins beyond the zero: rounding decided on the sign here
-            search.end_value = TINY * direction
-            search.sampled[FINEST * search.event + search.degree - 1] = search.end_value
+            add_zero_at_end(ctx, search, x, way)
+        else:
+            add_zero(search, x, 0)
 
 
 @compiled
@@ -242,7 +244,7 @@ def find_zeros(ctx, search):
     if search.points[n - 1] == 1.0 and count > 0:
         before = signs[count - 1]
         if p[n - 1] == 0.0:
-            add_zero(search, 1.0, direction_at_end(ctx, search, before))
+            add_zero_at_end(ctx, search, 1.0, before)
         elif before != sign(p[n - 1]):
             solve(ctx, search, marks[count - 1], 1.0, sign(p[n - 1]))
     drop_false_touches(search)

@@ -19,6 +19,7 @@ from integrators.kernel.step.coefficients import coefficient
 from integrators.kernel.step.control import INFINITY
 from integrators.kernel.step.fixed_point import evaluate
 from integrators.kernel.step.rule import STAGNATION
+from integrators.kernel.step.sample import place
 from integrators.kernel.step.stages import offset
 from problems.analysis.sizes import ROUNDING
 
@@ -150,8 +151,7 @@ def note_sizes(ctx):
 @compiled
 def momentum(ctx, d):
     """Return the component of the state whose slope is row d of the field."""
-    i = 8 * (d // 4) + d % 4 if ctx.second else d
-    return ctx.state[i]
+    return ctx.state[place(ctx, ctx.rows + d if ctx.second else d)]
 
 
 @compiled
@@ -176,12 +176,12 @@ def measure_on_line(ctx, state, end, start, h, part, noise):
         c = get(ctx.tables.nodes, 8 * chunk)
         put(ctx.times, 8 * chunk, splat8(ctx.t0) + (splat8(start) + c * splat8(part * h)))
         for d in range(rows):
-            i = 8 * (d // 4) + 4 + d % 4 if ctx.second else d
+            i = place(ctx, d)
             way = part * (end[i] - state[i])
             way += copysign(LEAST_WAY * abs(state[i]), way if way != 0.0 else h)
             put(scratch.old_stages, offset(ctx, chunk) + lanes * d, splat8(state[i]) + c * splat8(way))
     for d in range(rows):
-        j = 8 * (d // 4) + 4 + d % 4 if ctx.second else d
+        j = place(ctx, d)
         if state[j] == 0.0 and end[j] == 0.0:
             continue  # what stays 0 is not rounded: the field may not be defined, or another one, beside it
         left = UNIT / ctx.blocks.weights[d]

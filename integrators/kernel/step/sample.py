@@ -12,29 +12,41 @@ def dimension(ctx):
 
 
 @compiled
+def place(ctx, d):
+    """Return where component d of (q, p), or of y, is in a state."""
+    if ctx.second == 0:
+        return d
+    rows = ctx.rows
+    return 8 * (d // 4) + 4 + d % 4 if d < rows else 8 * ((d - rows) // 4) + (d - rows) % 4
+
+
+@compiled
+def velocity(ctx, d):
+    """Return the rate of position d, in second-order form."""
+    return ctx.factors.velocity[d] * ctx.state[place(ctx, ctx.rows + d)]
+
+
+@compiled
+def put_in_lanes(ctx, times, stages, t, end, at_end):
+    """Put a time and the present state to the first lane, another time and state to all others."""
+    for lane in range(ctx.lanes):
+        times[lane] = end if lane else t
+        for d in range(ctx.rows):
+            stages[ctx.lanes * d + lane] = (at_end if lane else ctx.state)[place(ctx, d)]
+
+
+@compiled
 def write(ctx, state, out):
     """Write a state in the layout of `Context.state` to memory as (q, p) or y."""
-    rows = ctx.rows
-    for d in range(rows):
-        if ctx.second:
-            i = 8 * (d // 4) + d % 4
-            out[d] = state[i + 4]
-            out[rows + d] = state[i]
-        else:
-            out[d] = state[d]
+    for d in range(dimension(ctx)):
+        out[d] = state[place(ctx, d)]
 
 
 @compiled
 def read(ctx, state, given):
     """Read a state that is laid out as `write` does."""
-    rows = ctx.rows
-    for d in range(rows):
-        if ctx.second:
-            i = 8 * (d // 4) + d % 4
-            state[i + 4] = given[d]
-            state[i] = given[rows + d]
-        else:
-            state[d] = given[d]
+    for d in range(dimension(ctx)):
+        state[place(ctx, d)] = given[d]
 
 
 @compiled

@@ -4,7 +4,7 @@ from integrators.kernel.context import ACT, ADVANCE, ATTEMPT, DONE, GO_ON, PART,
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.views import doubles, integers
 from integrators.kernel.step.sample import write
-from integrators.kernel.trajectory.act import end_and_change, go_on
+from integrators.kernel.trajectory.act import change, go_on
 from integrators.kernel.trajectory.anew import reset
 from integrators.kernel.trajectory.loop import advance, context, take_steps
 from integrators.kernel.trajectory.part import part_step
@@ -34,7 +34,7 @@ def entry(operation, ctx, partial, between, count, times, targets, parts, first,
             write(context(partial), context(partial).next_state, y)
         return outcome
     if operation == ACT:
-        return end_and_change(context(ctx))
+        return change(context(ctx))
     if operation == GO_ON:
         return go_on(context(ctx))
     if operation == ATTEMPT:

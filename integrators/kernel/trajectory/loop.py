@@ -1,13 +1,13 @@
 """Whole trajectories: steps to the times asked for."""
 
-from integrators.kernel.context import BUDGET, DONE, MISSED, NOISY, STATE, UNSCALED, UNSOLVED, Context
+from integrators.kernel.context import BUDGET, DONE, MISSED, NOISY, STATE, UNSCALED, Context
 from integrators.kernel.inside.discontinuities import confirm_previous_step, is_smooth_to_end
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.step.advance import looked, step, watched
 from integrators.kernel.step.estimate import shorten_first
 from integrators.kernel.step.sample import dimension, write
-from integrators.kernel.trajectory.act import act, end_at_action, step_or_act
+from integrators.kernel.trajectory.act import act, length_to_take, look_for_action, step_or_act
 from integrators.kernel.trajectory.part import followed, sample
 from integrators.kernel.trajectory.vary import TIME_TOLERANCE, remaining, solve_adaptive, take
 
@@ -25,12 +25,6 @@ def repeat(ctx, target, budget):
             return outcome, budget
         budget -= 1
     return DONE, budget
-
-
-@compiled
-def look_first(ctx):
-    """Look for events in the solved step, if they may end it; the outcome."""
-    return end_at_action(ctx) if ctx.events.act and ctx.events.seen == 0 else DONE
 
 
 @compiled
@@ -53,26 +47,20 @@ def approach(ctx, t, budget):
             watched(ctx) or (inside and time_left > (1.0 - ctx.tables.nodes[0]) * h)
         ) and not is_smooth_to_end(ctx):
             continue
-        outcome = look_first(ctx)
+        outcome = look_for_action(ctx)
         if outcome != DONE:
             return outcome, budget
-        if ctx.solved == UNSOLVED:  # an event at its start has changed the state
-            continue
-        h = abs(ctx.h)
-        inside = time_left < h - TIME_TOLERANCE * abs(t)
-        if inside:
+        if time_left < length_to_take(ctx) - TIME_TOLERANCE * abs(t):
             return DONE, budget
         if budget == 0:
             return BUDGET, budget
-        outcome = looked(ctx)
+        acts = ctx.events.acting
+        outcome = act(ctx) if acts else looked(ctx)
         if outcome != DONE:
             return outcome, budget
         budget -= 1
-        take(ctx)
-        if ctx.events.acting:
-            outcome = act(ctx)
-            if outcome != DONE:
-                return outcome, budget
+        if not acts:
+            take(ctx)
 
 
 @compiled
@@ -151,25 +139,24 @@ def take_steps(ctx, times, out, budget):
             return outcome
         if not confirmed or (watched(ctx) and not is_smooth_to_end(ctx)):
             continue
-        outcome = look_first(ctx)
+        outcome = look_for_action(ctx)
         if outcome != DONE:
             return outcome
-        if ctx.solved == UNSOLVED:  # an event at its start has changed the state
-            continue
-        if abs(remaining(ctx, end)) < abs(ctx.h) - TIME_TOLERANCE * abs(end):
+        if abs(remaining(ctx, end)) < length_to_take(ctx) - TIME_TOLERANCE * abs(end):
             return DONE
         if budget == 0:
             return BUDGET
-        outcome = looked(ctx)
-        if outcome != DONE:
+        taken, acts = ctx.counters.steps, ctx.events.acting
+        outcome = act(ctx) if acts else looked(ctx)
+        if outcome != DONE and not acts:
             return outcome
-        take(ctx)
-        if ctx.events.acting:
-            outcome = act(ctx)
-        times[count] = ctx.t0
-        write(ctx, ctx.state, out + dim * count)
-        followed(ctx, ctx, STATE)
-        count += 1
+        if not acts:
+            take(ctx)
+        if ctx.counters.steps > taken:  # else an event at the start of the step has changed the state
+            times[count] = ctx.t0
+            write(ctx, ctx.state, out + dim * count)
+            followed(ctx, ctx, STATE)
+            count += 1
         if outcome != DONE:
             ctx.samples_written = count
             return outcome
