@@ -71,9 +71,8 @@ def check_times(times: ArrayLike, t: float) -> Array:
         return grid
     if not np.isfinite(grid).all():
         raise InputError("times must be finite numbers.")
-    raise InputError(
-        f"times must be strictly monotone and ahead of the present time {t!r}; {_out_of_order(grid, t)}."
-    )
+    needed = "strictly monotone" if ahead else f"strictly monotone and ahead of the present time {t!r}"
+    raise InputError(f"times must be {needed}; {_out_of_order(grid, t)}.")
 
 
 def _out_of_order(grid: Array, t: float) -> str:

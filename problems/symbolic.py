@@ -96,8 +96,8 @@ def from_sympy(
         if matrix.rows > len(state):
             raise InputError(
                 f"the equations of this {type(expression).__name__} have {matrix.rows} unknowns for "
-                f"{len(state)} coordinates and velocities: the last {matrix.rows - len(state)} are Lagrange "
-                "multipliers of its constraints; make a problems.Constrained of the coordinates, or choose "
+                f"{len(state)} coordinates and velocities; those behind them are Lagrange multipliers of its "
+                "constraints. Make a problems.Constrained of the coordinates, or choose "
                 "coordinates that are independent."
             )
         places: dict[Any, Callable[..., Any]] = {x: _component("y", i) for i, x in enumerate(state)}

@@ -21,7 +21,7 @@ from problems.systems.base import System
 from problems.systems.vector_field import VectorField
 
 Array = NDArray[np.float64]
-PER_PAIR = 20  # operations of Newton's attraction between two bodies, about
+PER_PAIR = 32  # operations of Newton's attraction between two bodies, at most
 
 
 @checked_arguments

@@ -157,6 +157,13 @@ class Parameters:
         object.__setattr__(self, "_graph", graph)
         object.__setattr__(self, "_layout", layout)
 
+    def as_node(self) -> NoReturn:
+        """Refuse to be a number: a third argument is not the derivative or a parameter itself."""
+        refuse(
+            "this calculates with par, which holds all parameters, as if it were one number",
+            f"write par.{next(iter(self._layout), 'NAME')}",
+        )
+
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__"):
             raise AttributeError(name)

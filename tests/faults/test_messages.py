@@ -66,7 +66,9 @@ def test_multipliers_of_sympys_equations_are_named():
     L = m * (x.diff() ** 2 + y.diff() ** 2) / 2 - m * g * y
     equations = mechanics.LagrangesMethod(L, [x, y], hol_coneqs=[x**2 + y**2 - length**2])
     equations.form_lagranges_equations()
-    with pytest.raises(InputError, match=r"5 unknowns for 4 coordinates.*last 1 are Lagrange multipliers"):
+    with pytest.raises(
+        InputError, match=r"5 unknowns for 4 coordinates.*those behind them are Lagrange multipliers"
+    ):
         problems.from_sympy(equations, parameters={m: 1.0, g: 9.81, length: 1.0})
 
 
@@ -330,3 +332,15 @@ def test_a_table_of_the_time_is_refused_step_by_step_as_in_a_run():
     assert abs(run.until(2.0)[0] - (1.0 - np.cos(2.0))) < 1e-4  # measured 2.4e-6: a cubic through the samples
     with pytest.raises(InputError, match=r"data from 0.0 to 2.0, and from t = 2.0 to 5.0"):
         run.until(5.0)
+
+
+def test_parameters_as_a_number_times_twice_and_two_hundred_massless_bodies_are_told_with_the_fix():
+    with pytest.raises(InputError, match=r"par, which holds all parameters, as if.*write par\.rate"):
+        VectorField(lambda t, y, par: [par * y[0]], dim=1, parameters={"rate": 1.0})
+    with pytest.raises(InputError, match=r"times must be strictly monotone; times\[1\] = 5\.0 is followed"):
+        integrate(problems.load("kepler", t_end=10.0), HBVM(), times=[0.0, 5.0, 5.0, 10.0])
+    place, velocity = np.random.default_rng(0).normal(size=(2, 202, 3))
+    with pytest.raises(
+        InputError, match=r"200 massless bodies beside 2 with mass.*make the problem with massless=1"
+    ):
+        problems.nbody([1.0, 1e-3], place, velocity, massless=200, t_end=1.0)
