@@ -1,6 +1,5 @@
 """A step of Gauss collocation in double-double arithmetic, by fixed-point iteration."""
 
-import hashlib
 from functools import cache
 from typing import Any
 
@@ -45,13 +44,8 @@ def _numbers(table: Any) -> Numbers:
 def field_of(system: System) -> tuple[str, Any]:
     """Return a digest of a system's field, and the field for numbers: ``field(t, y, par, out)``."""
     source = targets.source(system, "field", "numba", limit=0)
-    key = hashlib.sha256(source.text.encode()).hexdigest()
-    if key not in _fields:
-        _fields[key] = compiled(source.text, source.name)
-    return key, _fields[key]
-
-
-_fields: dict[str, Any] = {}
+    field = targets.compiled("double-double", source, lambda: compiled(source.text, source.name))
+    return source.sha256, field
 
 
 @njit

@@ -77,8 +77,15 @@ Quantity = str | Function | Jacobian
 """One of a system's functions, a Jacobian, or one of the names that `System.function` knows."""
 
 _texts: WeakKeyDictionary[System, dict[tuple[Function, str, int | None], Source]] = WeakKeyDictionary()
-_fingerprints: WeakKeyDictionary[System, str] = WeakKeyDictionary()
 _compiled: dict[tuple[str, str], Any] = {}
+
+
+def compiled(kind: str, emitted: Source, make: Callable[[], Any]) -> Any:
+    """Return what ``make`` compiles of a text, once in a process for each kind and each text."""
+    key = (kind, emitted.sha256)
+    if key not in _compiled:
+        _compiled[key] = make()
+    return _compiled[key]
 
 
 def source(system: System, quantity: Quantity, backend: str, *, limit: int | None = SMALL) -> Source:
@@ -142,16 +149,12 @@ def fingerprint(system: System) -> str:
 
     For an `Opaque` system it is that of its function's code and of the values that the function uses.
     """
-    if system not in _fingerprints:
-        if isinstance(system, Opaque):
-            digest = code_digest(system.f, system.dim, system.name)
-        else:
-            emitted = source(system, "field", "numba")
-            body = emitted.text.replace(emitted.name, "field")
-            head = f"{system.kind} {system.dim} {system.dof}\n"
-            digest = hashlib.sha256((head + body).encode()).hexdigest()
-        _fingerprints[system] = digest
-    return _fingerprints[system]
+    if isinstance(system, Opaque):
+        return code_digest(system.f, system.dim, system.name)
+    emitted = source(system, "field", "numba")
+    body = emitted.text.replace(emitted.name, "field")
+    head = f"{system.kind} {system.dim} {system.dof}\n"
+    return hashlib.sha256((head + body).encode()).hexdigest()
 
 
 def _executed(emitted: Source, namespace: dict[str, Any]) -> Callable[..., Any]:
@@ -198,24 +201,22 @@ def _opaque_on_arrays(system: Opaque, t: Any, y: Any, par: Any) -> np.ndarray:
 
 
 def _on_arrays(emitted: Source, n_out: int) -> Callable[..., np.ndarray]:
-    key = ("numpy", emitted.sha256)
-    if key not in _compiled:
-        inner = _executed(emitted, {"np": np, "table": partial(interpolated, np), **_SPECIAL})
+    names = {"np": np, "table": partial(interpolated, np), **_SPECIAL}
+    inner = compiled("numpy", emitted, lambda: _executed(emitted, names))
 
-        def evaluate(t: Any, y: Any, par: Any) -> np.ndarray:
-            y = np.asarray(y)
-            dtype = np.longdouble if y.dtype == np.longdouble else np.float64
-            y, par = np.asarray(y, dtype), np.asarray(par, dtype)
-            if par.ndim == 1 and y.ndim == 2:
-                par = par[:, np.newaxis]
-            out = np.empty((n_out, *y.shape[1:]), dtype)
-            with np.errstate(all="ignore"):
-                inner(t, y, par, out)
-            return out
+    def evaluate(t: Any, y: Any, par: Any) -> np.ndarray:
+        y = np.asarray(y)
+        dtype = np.longdouble if y.dtype == np.longdouble else np.float64
+        y, par = np.asarray(y, dtype), np.asarray(par, dtype)
+        if par.ndim == 1 and y.ndim == 2:
+            par = par[:, np.newaxis]
+        out = np.empty((n_out, *y.shape[1:]), dtype)
+        with np.errstate(all="ignore"):
+            inner(t, y, par, out)
+        return out
 
-        evaluate.__name__ = emitted.name
-        _compiled[key] = evaluate
-    return _compiled[key]
+    evaluate.__name__ = emitted.name
+    return evaluate
 
 
 def _special(name: str) -> Callable[[Any], Any]:
@@ -242,20 +243,21 @@ def numba(system: System, quantity: Quantity, *, limit: int | None = SMALL) -> A
     function = _function(system, quantity)
     cost = compilable(system, function)
     emitted = source(system, function, "numba", limit=limit)
-    key = ("numba", emitted.sha256)
-    if key not in _compiled:
+
+    def make() -> Any:
         if cost >= LONG:
             warnings.warn(
                 f"the {function.name} of {system.name} is {cost:,} operations written out, compiled "
                 f"for about {cost / PER_SECOND:.0f} s; write loops as m.sum(lambda i: q[i]**2, range(n)) or "
                 "m.each(lambda i: ..., range(n)), which takes about one.",
-                stacklevel=2,
+                stacklevel=4,
             )
         cut = emitted.text.index(f"def {emitted.name}(")
         decorator = '@numba.njit(cache=True, error_model="numpy")\n'
         text = _NUMBA_HEAD + emitted.text[:cut] + "\n" + decorator + emitted.text[cut:]
-        _compiled[key] = getattr(cache.module(text, emitted.name), emitted.name)
-    return _compiled[key]
+        return getattr(cache.module(text, emitted.name), emitted.name)
+
+    return compiled("numba", emitted, make)
 
 
 def compilable(system: System, quantity: Quantity) -> int:
@@ -297,12 +299,9 @@ def jax(system: System, quantity: Quantity, *, limit: int | None = SMALL) -> Cal
         raise _missing("jax") from error
     library.config.update("jax_enable_x64", True)
     emitted = source(system, quantity, "jax", limit=limit)
-    key = ("jax", emitted.sha256)
-    if key not in _compiled:
-        special = {name: getattr(library.scipy.special, name) for name in _SPECIAL}
-        namespace = {"np": np, "jnp": jnp, "table": partial(interpolated, jnp), **special}
-        _compiled[key] = _executed(emitted, namespace)
-    return _compiled[key]
+    special = {name: getattr(library.scipy.special, name) for name in _SPECIAL}
+    namespace = {"np": np, "jnp": jnp, "table": partial(interpolated, jnp), **special}
+    return compiled("jax", emitted, lambda: _executed(emitted, namespace))
 
 
 def heyoka(system: System, quantity: Quantity = "field") -> list[Any]:
@@ -365,6 +364,7 @@ __all__ = [
     "Quantity",
     "Source",
     "compilable",
+    "compiled",
     "fingerprint",
     "heyoka",
     "heyoka_of",
