@@ -104,26 +104,37 @@ def checked(owner: str, name: str, value: Any, annotation: Any) -> Any:
     problems.errors.InputError
         One sentence: the value, and what it must be.
     """
-    if get_origin(annotation) in (Union, UnionType) and NoneType in get_args(annotation):
-        if value is None:
-            return None
-        annotation = Union[tuple(kind for kind in get_args(annotation) if kind is not NoneType)]  # noqa: UP007
+    kind = _without_none(annotation)
+    if value is None and kind != annotation:
+        return None
     conditions: list[Any] = []
-    if get_origin(annotation) is Annotated:
-        annotation, *conditions = get_args(annotation)
+    if get_origin(kind) is Annotated:
+        kind, *conditions = get_args(kind)
     for condition in conditions:
         if hasattr(condition, "checked"):
             return condition.checked(owner, name, value)
-    if get_origin(annotation) is Literal:
-        return _one_of(owner, name, value, get_args(annotation))
-    words, read = _KINDS.get(annotation, ("", lambda value: value))
-    if annotation in (float, int, Sequence[float]) and not isinstance(value, bool):
+    if get_origin(kind) is Literal:
+        return _one_of(owner, name, value, get_args(kind))
+    words, read = _KINDS.get(kind, ("", lambda value: value))
+    if kind in (float, int, Sequence[float]) and not isinstance(value, bool):
         refuse_more_than_numbers(f"{name}={shown(value)} of {owner}", value)
     result = read(value)
     if (words and result is None) or not all(must.holds(result) for must in conditions):
         # The narrowest condition is the one that is told.
         raise refusal(owner, name, value, conditions[0].be if conditions else words)
     return result
+
+
+def _allows_everything(annotation: Any) -> bool:
+    """Whether `checked` returns any value as it is."""
+    kind = _without_none(annotation)
+    return get_origin(kind) not in (Annotated, Literal) and kind not in _KINDS
+
+
+def _without_none(annotation: Any) -> Any:
+    if get_origin(annotation) not in (Union, UnionType):
+        return annotation
+    return Union[tuple(kind for kind in get_args(annotation) if kind is not NoneType)]  # noqa: UP007
 
 
 def refusal(owner: str, name: str, value: Any, words: str) -> InputError:
@@ -212,6 +223,8 @@ class Arguments:
         self.parameters = signature.parameters
         self._defaults = {key: parameter.default for key, parameter in self.parameters.items()}
         self._by_place = [key for key, each in self.parameters.items() if each.kind is not each.KEYWORD_ONLY]
+        self._needed = {key for key, default in self._defaults.items() if default is EMPTY}
+        self._free = {key for key, each in self.parameters.items() if _allows_everything(each.annotation)}
 
     def check_names(self, values: Sequence[Any], options: Mapping[str, Any]) -> None:
         """Refuse what the signature does not take.
@@ -243,8 +256,8 @@ class Arguments:
         if len(given) < len(values) + len(options):
             twice = next(key for key in by_place if key in options)
             raise InputError(f"{name} gets {twice} twice, by place and by name; give it once.")
-        missing = [key for key, default in self._defaults.items() if default is EMPTY and key not in given]
-        if missing:
+        if not self._needed <= given:
+            missing = [key for key in self.parameters if key in self._needed - given]
             raise InputError(
                 f"{name} needs {', '.join(missing)}; give a value as in {name}({missing[0]}=...)."
             )
@@ -266,7 +279,7 @@ class Arguments:
         self.check_names(values, options)
         call = self._defaults.copy()
         for key, value in (*zip(self._by_place, values, strict=False), *options.items()):
-            result = self.value(key, value)
+            result = value if key in self._free else self.value(key, value)
             call[key] = value if type(value) in (int, float) else result  # it prints as it was made: e=0
         return call
 
