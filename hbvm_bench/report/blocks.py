@@ -54,8 +54,8 @@ CITE = "`hbvm-bench cite` prints how the authors of the methods ask to be cited.
 KINDS = ("chosen", "default", "recommended", "as published", "outside its domain")
 EQUAL_ERRORS = "Time of each library's fastest setting relative to the fastest of HBVM and Gauss"
 AS_MANY = (
-    "As many settings of every family take part: of one with a fixed and an adaptive step size every second "
-    "of either kind, in the order in which they were declared."
+    "No family has more settings than those with one kind of step size: of one that declares twice as many "
+    "for a fixed and an adaptive one, every second of either kind takes part, in the order of declaration."
 )
 
 
