@@ -19,12 +19,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from integrators.events.finder import Ending
+from integrators.kernel.adaptive import Adaptive as AdaptiveSteps
 from integrators.kernel.context import Context
 from integrators.kernel.engines import run, run_own
 from integrators.kernel.ensemble.group import LEFT
 from integrators.kernel.ensemble.prepared import Lanes
 from integrators.kernel.implicit.workspace import Solver
 from integrators.kernel.pace import Pace
+from integrators.kernel.plan import Plan
 from integrators.kernel.stepper import HBVMStepper
 from integrators.options import Count
 from integrators.protocol import Array, Samples, Status, Trajectories, UserError, telling
@@ -58,13 +60,13 @@ class BatchProgram(Protocol):
 
     system: System
     h: float
-    first: float | None
+    plan: Plan
+    adaptive: AdaptiveSteps | None
     solver: Solver
 
     def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> HBVMStepper: ...
     def in_lanes(self) -> Lanes | None: ...
     def contexts(self) -> tuple[Context, Context]: ...
-    def limit(self, context: Context, interval: float) -> None: ...
 
 
 def prepare_batch(
@@ -295,14 +297,15 @@ class Adaptive(_InLanes):
         return [self.work.program.contexts()[:1] for _ in range(self.lanes.width)]
 
     def memory(self) -> Any:
-        contexts = self.contexts()
+        contexts, adaptive = self.contexts(), self.work.program.adaptive
+        assert adaptive is not None
         for context, *_ in contexts:
             context.implicit.strategy = self.work.program.solver.strategy
             context.controller.interval = float(abs(self.work.result.t[-1] - self.work.t0))
-            self.work.program.limit(context, context.controller.interval)
+            adaptive.limit(context, context.controller.interval)
         group, _ = self.lanes.groups(self.work.t0, self.h, self.numbers, self.arrays)
         group.contexts = [context for context, *_ in contexts]
-        group.first_length = self.work.program.first or 0.0
+        group.first_length = self.work.program.plan.h or 0.0
         return group, contexts
 
     def advance(self, memory: Any, budget: int) -> int:

@@ -17,6 +17,7 @@ import numpy as np
 import problems
 from integrators.kernel.native import machine
 from integrators.kernel.native.field import assembly
+from integrators.kernel.plan import Plan
 from integrators.kernel.program import HBVMProgram
 from integrators.kernel.routes import WIDE
 from problems import targets
@@ -94,7 +95,7 @@ def operations(source: str) -> Counter[str]:
 
 def measure(problem: Problem, k: int, s: int, h: float) -> Cost:
     """Measure an iteration and a step; see `Cost`."""
-    programs = [HBVMProgram(problem.system, k=k, s=s, h=h * share) for share in SHARES]
+    programs = [HBVMProgram(problem.system, Plan(k=k, s=s, h=h * share)) for share in SHARES]
     fastest, iterations = np.full(len(SHARES), np.inf), np.zeros(len(SHARES))
     for _ in range(ROUNDS):
         for i, program in enumerate(programs):
@@ -109,7 +110,7 @@ def measure(problem: Problem, k: int, s: int, h: float) -> Cost:
 
 
 def _say(problem: Problem, k: int, s: int, h: float) -> None:
-    program = HBVMProgram(problem.system, k=k, s=s, h=h)
+    program = HBVMProgram(problem.system, Plan(k=k, s=s, h=h))
     shape, constants = program.shape, program.constants
     quantity = "force" if program.second else "field"
     counts = operations(targets.source(problem.system, quantity, "numba").text)
@@ -142,7 +143,7 @@ def main() -> None:
     given = parser.parse_args()
     problem = problems.load(given.problem)
     if given.assembly:
-        program = HBVMProgram(problem.system, k=given.k, s=given.s, h=given.h)
+        program = HBVMProgram(problem.system, Plan(k=given.k, s=given.s, h=given.h))
         print(assembly(problem.system, "force" if program.second else "field", program.constants.lanes))
     else:
         _say(problem, given.k, given.s, given.h)

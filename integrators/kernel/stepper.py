@@ -40,6 +40,7 @@ from integrators.kernel.native.memory import address
 from integrators.kernel.noise import ALL_LENGTHS, Noise, field_noise
 from integrators.kernel.pace import FEWEST, Pace
 from integrators.kernel.parts.implicit import ALWAYS_IMPLICIT, AUTO, FOR_VECTORS, NOT_WANTED
+from integrators.kernel.plan import Plan
 from integrators.kernel.searches import LastingSearch
 from integrators.kernel.spare import Pair, Spare
 from integrators.kernel.step.rule import STAGNATION
@@ -97,7 +98,7 @@ class Program(Protocol):
     def lanes(self) -> bool: ...
 
     kept: Kept | None
-    projected: bool
+    plan: Plan
 
     vectors: dict[tuple[int, bool], Context]
 
@@ -249,7 +250,7 @@ class HBVMStepper(ABC):
         system, program = self._program.system, self._program
         if not system.traced:
             need = "a formula"
-        elif program.projected:
+        elif program.plan.projected:
             need = "steps without a projection, which they do not follow; leave out projection='energy'"
         elif program.kept:
             need = "a Runge-Kutta method: line integrals are none; use Gauss"

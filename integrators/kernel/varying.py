@@ -2,11 +2,11 @@
 
 import math
 import sys
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
-from integrators.kernel.breakpoints import Breakpoints
+from integrators.kernel.adaptive import Adaptive
 from integrators.kernel.context import (
     ANEW,
     ATTEMPT,
@@ -42,18 +42,6 @@ LARGER = 1e3  # times as large as a block is, at least, what it will reach is wo
 NOISE = 1e-12  # part of what it will reach, for what its growth leaves, that a field's rounding may come to
 
 
-class VaryingProgram(Program, Protocol):
-    """The same of one whose steps vary."""
-
-    tol: float
-    max_step: float | None
-    max_steps: int | None
-
-    def breakpoints(self, par: Array) -> Breakpoints: ...
-    def limit(self, context: Context, interval: float) -> None: ...
-    def start(self, y0: Array, par: Array | None = None, t0: float = 0.0) -> "AdaptiveStepper": ...
-
-
 class AdaptiveStepper(HBVMStepper):
     """A trajectory whose steps vary; satisfies `integrators.protocol.Stepper`.
 
@@ -63,13 +51,12 @@ class AdaptiveStepper(HBVMStepper):
     length is tried again from there.
     """
 
-    _program: VaryingProgram
     _given: Array | None = None  # sizes to take where they are asked for, of one that looks ahead
     _reached: Array | None = None  # times and sizes that it has seen
 
-    def __init__(self, program: VaryingProgram, y: Array, par: Array, t0: float):
-        self._breakpoints = program.breakpoints(par)
-        self._max_steps = program.max_steps
+    def __init__(self, program: Program, adaptive: Adaptive, y: Array, par: Array, t0: float):
+        self._adaptive, self._breakpoints = adaptive, adaptive.breakpoints(par)
+        self._max_steps = program.plan.max_steps
         self._origin = self._goal = t0
         self._in_vain = 1
         self._known: Noise | None = None
@@ -164,7 +151,7 @@ class AdaptiveStepper(HBVMStepper):
     def _renew(self, par: Array) -> None:
         super()._renew(par)
         if self._breakpoints.moved_by(par):
-            self._breakpoints = self._program.breakpoints(par)
+            self._breakpoints = self._adaptive.breakpoints(par)
             self._stop()
 
     def _restart(self, t: float) -> None:
@@ -193,7 +180,7 @@ class AdaptiveStepper(HBVMStepper):
             controller.interval = max(
                 controller.interval, abs(self._goal - self._origin), abs(end - self._origin)
             )
-            self._program.limit(ctx, controller.interval)
+            self._adaptive.limit(ctx, controller.interval)
         here = self.t
         way = (self._goal if end == here else end) - here
         if way == 0.0 or not math.copysign(1.0, way) * ctx.controller.next_length < 0.0:
@@ -314,12 +301,12 @@ class AdaptiveStepper(HBVMStepper):
         expected = self._of_blocks(sizes)
         if (expected > LARGER * self._context.estimate.scale).any():
             growth = self._growth(known[-1, 0], sizes, expected)
-            expected *= min(1.0, max(1.0, NOISE / self._program.tol) / growth)
+            expected *= min(1.0, max(1.0, NOISE / self._adaptive.tol) / growth)
         return expected
 
     def _scout(self, y: Array) -> "AdaptiveStepper":
         """Return a trajectory from a state now."""
-        scout = self._program.start(y, self._context.par.copy(), self.t)
+        scout = AdaptiveStepper(self._program, self._adaptive, y, self._context.par.copy(), self.t)
         scout.destination = self._goal
         return scout
 
@@ -350,7 +337,7 @@ class AdaptiveStepper(HBVMStepper):
 
         Two trajectories tell it whose errors are relative to that, one of them from a state that is moved.
         """
-        nudge = math.sqrt(max(self._program.tol, SMALLEST))
+        nudge = math.sqrt(max(self._adaptive.tol, SMALLEST))
         moved = np.random.default_rng(0).choice([-1.0, 1.0], sizes.size)
         times = np.linspace(self.t, end, 65)[1:]
         states = []
@@ -446,7 +433,7 @@ class AdaptiveStepper(HBVMStepper):
 
     def _failure(self, outcome: int) -> tuple[Status, str]:
         """Return the status that an outcome stands for, and the reason as a sentence."""
-        longest = self._program.max_step
+        longest = self._program.plan.max_step
         if outcome == UNDERFLOW and longest is not None and longest <= SHORTEST * abs(self.t):
             return Status.STEP_UNDERFLOW, (
                 f"a step of max_step={longest!r} from t = {self.t!r} cannot be told from none; give more."
@@ -459,7 +446,7 @@ class AdaptiveStepper(HBVMStepper):
             )
         if outcome == UNDERFLOW:
             return Status.STEP_UNDERFLOW, (
-                f"no step from t = {self.t!r} is short enough for tol={self._program.tol!r}; "
+                f"no step from t = {self.t!r} is short enough for tol={self._adaptive.tol!r}; "
                 "the solution may end or be singular here."
             )
         if outcome == NOISY:

@@ -2,9 +2,10 @@
 
 import re
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 from integrators.caveats import undetected, undetected_in_time, unknown_discontinuities, why_undetected
+from integrators.kernel.plan import Plan
 from integrators.methods.hbvm import HBVM, Solver
 from integrators.options import Absolute, Breakpoints, Count, Stages, Step, Tolerance
 from integrators.protocol import MethodBase, Program
@@ -197,27 +198,18 @@ class Gauss(MethodBase):
         """Compile as `HBVM.compile` does, Poisson systems like any other."""
         if (refusal := self._refusal(system)) is not None:
             raise InputError(refusal)
-        program = self._compiled(system)
-        program.method = self
-        return program
-
-    def _compiled(self, system: System) -> Any:
         if self.precision != "double" and self.h is not None:
             from integrators.extended.program import DoubleDoubleProgram
 
-            return DoubleDoubleProgram(system, self, s=self.s, h=self.h)
+            program = DoubleDoubleProgram(system, self, s=self.s, h=self.h)
+            program.method = self
+            return program
+        from integrators.kernel.program import compiled  # numba is for those who integrate
+
+        return compiled(self, system)
+
+    def plan(self, system: System) -> Plan:
+        """Return s and all else that the steps follow from."""
         if self.tol is not None and self.steps is not None:
-            from integrators.kernel.program import ReversibleProgram
-
-            return ReversibleProgram(system, s=self.s, tol=self.tol)
-        if self.tol is not None:
-            from integrators.kernel.program import AdaptiveProgram
-
-            return AdaptiveProgram(
-                system, k=self.s, s=self.s, tol=self.tol, h=self.h, solver=self.solver,
-                **self._hbvm().control(),
-            )  # fmt: skip
-        from integrators.kernel.program import HBVMProgram  # numba is for those who integrate
-
-        assert self.h is not None
-        return HBVMProgram(system, k=self.s, s=self.s, h=self.h, solver=self.solver)
+            return Plan(k=self.s, s=self.s, tol=self.tol, solver="fixed_point", reversible=True)
+        return Plan(k=self.s, s=self.s, h=self.h, tol=self.tol, solver=self.solver, **self._hbvm().control())

@@ -1,9 +1,10 @@
 """Hamiltonian Boundary Value Methods, HBVM(k, s), with fixed or adaptive step size."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from integrators.caveats import undetected, undetected_in_time, unknown_discontinuities, why_undetected
+from integrators.kernel.plan import Plan
 from integrators.methods.automatic import ACCURATE_IN_LANES, WIDE, choose, choose_projected, nodes_of
 from integrators.options import Absolute, Breakpoints, Count, Stages, Step, Tolerance
 from integrators.protocol import MethodBase, Program
@@ -293,42 +294,37 @@ class HBVM(MethodBase):
         """Compile the vector field of ``system``, and the kernel if this machine has not yet."""
         if (refusal := self._refusal(system)) is not None:
             raise InputError(refusal)
-        program = self._compiled(system)
-        program.method = self
-        return program
+        from integrators.kernel.program import compiled  # numba is for those who integrate
 
-    def _compiled(self, system: System) -> Any:
+        return compiled(self, system)
+
+    def plan(self, system: System) -> Plan:
+        """Return k, s and all else that the steps follow from."""
         keep = () if system.kind == "poisson" else tuple(system.invariants) if system.on_manifold else None
         tol = self.tol
-        if tol is not None:
-            from integrators.kernel.program import AdaptiveProgram
+        if tol is None:
+            assert self.k is not None
+            assert self.s is not None
+            return Plan(k=self.k, s=self.s, h=self.h, solver=self.solver, keep=keep)
 
-            def program(choice: tuple[int, int, float | None], tol: float = tol) -> AdaptiveProgram:
-                k, s, quadrature_error = choice
-                return AdaptiveProgram(
-                    system, k=k, s=s, tol=tol, quadrature_error=quadrature_error, h=self.h,
-                    solver=self.solver, keep=keep,
-                    projected=self.projection is not None, **self.control(),
-                )  # fmt: skip
+        def planned(choice: tuple[int, int, float | None], tol: float = tol) -> Plan:
+            k, s, quadrature_error = choice
+            return Plan(
+                k=k, s=s, tol=tol, quadrature_error=quadrature_error, h=self.h, solver=self.solver, keep=keep,
+                projected=self.projection is not None, **self.control(),
+            )  # fmt: skip
 
-            if self.s is not None:
-                k = self._nodes(system)
-                assert k is not None
-                return program((k, self.s, None))
-            if self.projection:
-                return program(choose_projected(tol))
-            alone, many = choose(system, tol), choose(system, tol, lanes=True)
-            single = program(alone)
-            if many != alone and keep is None:
-                accurate = many[0] < WIDE and tol == TOLERANCE
-                single.for_many = lambda: program(many, ACCURATE_IN_LANES if accurate else tol)
-            return single
-        from integrators.kernel.program import HBVMProgram  # numba is for those who integrate
-
-        assert self.h is not None
-        assert self.k is not None
-        assert self.s is not None
-        return HBVMProgram(system, k=self.k, s=self.s, h=self.h, solver=self.solver, keep=keep)
+        if self.s is not None:
+            k = self._nodes(system)
+            assert k is not None
+            return planned((k, self.s, None))
+        if self.projection:
+            return planned(choose_projected(tol))
+        alone, many = choose(system, tol), choose(system, tol, lanes=True)
+        if many == alone or keep is not None:
+            return planned(alone)
+        accurate = many[0] < WIDE and tol == TOLERANCE
+        return replace(planned(alone), many=planned(many, ACCURATE_IN_LANES if accurate else tol))
 
 
 def _not_projected(system: System) -> str | None:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 from integrators.caveats import undetected
+from integrators.kernel.plan import Plan
 from integrators.methods.hbvm import CITATION as BOOK
 from integrators.options import Absolute, Stages, Step, Tolerance
 from integrators.protocol import MethodBase, Program
@@ -186,15 +187,10 @@ class LineIntegral(MethodBase):
         problems.errors.InputError
             For an invariant that the system does not have, or that depends on time.
         """
-        from integrators.kernel.program import AdaptiveProgram, HBVMProgram
+        from integrators.kernel.program import compiled
 
-        program: HBVMProgram | AdaptiveProgram
-        if self.tol is not None:
-            program = AdaptiveProgram(
-                system, k=self.k, s=self.s, tol=self.tol, h=self.h, keep=self.invariants, atol=self.atol
-            )
-        else:
-            assert self.h is not None
-            program = HBVMProgram(system, k=self.k, s=self.s, h=self.h, keep=self.invariants)
-        program.method = self
-        return program
+        return compiled(self, system)
+
+    def plan(self, system: System) -> Plan:
+        """Return k, s and all else that the steps follow from."""
+        return Plan(k=self.k, s=self.s, h=self.h, tol=self.tol, keep=self.invariants, atol=self.atol)

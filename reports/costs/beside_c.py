@@ -127,10 +127,11 @@ class InC:
     """The C function on a problem; `run` integrates from its start."""
 
     def __init__(self, function: Any, problem: Problem):
+        from integrators.kernel.plan import Plan
         from integrators.kernel.program import HBVMProgram
 
         self._function, self._problem = function, problem
-        made = HBVMProgram(problem.system, k=8, s=8, h=STEP).start(problem.y0, problem.par)
+        made = HBVMProgram(problem.system, Plan(k=8, s=8, h=STEP)).start(problem.y0, problem.par)
         tables = made._context.tables
         self._tables = np.concatenate([np.asarray(getattr(tables, name), float) for name in TABLES])
         self._rule = np.array(_rule())

@@ -241,10 +241,12 @@ def _program(
     atol: float | tuple[float, ...] | None = None,
 ) -> "integrators.protocol.Program":
     if quadrature_error is not None:
-        from integrators.kernel.program import AdaptiveProgram
+        from integrators.kernel.plan import Plan
+        from integrators.kernel.program import HBVMProgram
 
         assert tol is not None
-        return AdaptiveProgram(system, k=k, s=s, tol=tol, quadrature_error=quadrature_error, h=h, atol=atol)
+        plan = Plan(k=k, s=s, tol=tol, quadrature_error=quadrature_error, h=h, atol=atol)
+        return HBVMProgram(system, plan)
     if k == s:
         return integrators.Gauss(s=s, h=h, tol=tol, atol=atol).compile(system)
     return integrators.HBVM(k=k, s=s, h=h, tol=tol, atol=atol).compile(system)

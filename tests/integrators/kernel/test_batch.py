@@ -1,5 +1,6 @@
 """Batches: trajectories in lanes, and one by one where lanes cannot take them."""
 
+from dataclasses import replace
 from threading import current_thread
 from time import perf_counter
 
@@ -13,7 +14,8 @@ from integrators.kernel import batch
 from integrators.kernel.batch import Work
 from integrators.kernel.ensemble import prepared
 from integrators.kernel.ensemble.prepared import in_powers
-from integrators.kernel.program import AdaptiveProgram, HBVMProgram
+from integrators.kernel.plan import Plan
+from integrators.kernel.program import HBVMProgram
 from integrators.protocol import Status
 from problems import Hamiltonian, Problem, VectorField
 from problems.errors import InputError
@@ -48,7 +50,7 @@ def distance(found, expected):
 )
 def test_what_goes_one_by_one_is_its_trajectories_bit_for_bit(k, s, form, sample):
     problem = problems.load("kepler", e=0.5)
-    program = HBVMProgram(problem.system, k=k, s=s, h=0.125, form=form)
+    program = HBVMProgram(problem.system, Plan(k=k, s=s, h=0.125, form=form))
     starts = problem.y0 * (1 + 0.05 * rng.normal(size=(5, 4)))
     times = np.array([0.0, 0.5, 1.3, 2.0, 7.77])
     batch = program.batch(starts, times=times, sample=sample)
@@ -62,7 +64,7 @@ def test_what_goes_one_by_one_is_its_trajectories_bit_for_bit(k, s, form, sample
 )
 def test_trajectories_in_lanes_are_those_of_integrate_up_to_rounding(k, s, form):
     problem = problems.load("kepler", e=0.5)
-    program = HBVMProgram(problem.system, k=k, s=s, h=0.125, form=form)
+    program = HBVMProgram(problem.system, Plan(k=k, s=s, h=0.125, form=form))
     assert program.in_lanes() is not None
     starts = problem.y0 * (1 + 0.05 * rng.normal(size=(11, 4)))
     times = np.array([0.0, 0.5, 1.3, 2.0, 7.77])  # ends of steps, and times between them
@@ -86,7 +88,7 @@ SYSTEMS = {
 def test_all_kinds_of_systems_run_in_lanes(name):
     problem_name, h, times = SYSTEMS[name]
     problem = problems.load(problem_name)
-    program = HBVMProgram(problem.system, k=8, s=8, h=h)
+    program = HBVMProgram(problem.system, Plan(k=8, s=8, h=h))
     starts = problem.y0 * (1 + 1e-3 * rng.normal(size=(3, 1)))
     parameters = np.tile(problem.par, (3, 1))
     parameters[1] *= 1.001
@@ -102,7 +104,7 @@ def test_time_is_each_stages_own():
         return [y[1], -y[0] + par["a"] * m.sin(par["w"] * t)]
 
     system = VectorField(f, dim=2, parameters={"a": 0.5, "w": 2.0})
-    program = HBVMProgram(system, k=6, s=6, h=0.25)
+    program = HBVMProgram(system, Plan(k=6, s=6, h=0.25))
     parameters = np.array([[0.5, 2.0], [0.1, 3.0], [0.7, 0.3]])
     starts = np.tile([1.0, 0.0], (3, 1))
     batch = program.batch(starts, parameters, times=[5.1, 20.0], t0=1.0)
@@ -114,7 +116,7 @@ def test_time_is_each_stages_own():
 @pytest.mark.parametrize("t0", [2.0**36, 1e9, -1e9])
 def test_times_far_from_0_are_the_same_in_lanes_and_alone(t0):
     system = VectorField(lambda t, y, m: [y[1] + m.sin(300 * t), -y[0]], dim=2)
-    program = HBVMProgram(system, k=8, s=4, h=0.1)
+    program = HBVMProgram(system, Plan(k=8, s=4, h=0.1))
     times = t0 + np.array([0.337, 0.771, 1.109, 1.26])  # between steps
     batch = program.batch([[1.0, 0.0]] * 3, times=times, t0=t0)
     alone = program.start([1.0, 0.0], None, t0).advance(times)
@@ -125,7 +127,7 @@ def test_times_far_from_0_are_the_same_in_lanes_and_alone(t0):
 @pytest.mark.parametrize(("name", "k", "h"), [("kepler", 12, 0.2), ("outer_solar_system", 8, 100.0)])
 def test_a_trajectory_is_the_same_bits_alone_in_any_place_and_on_any_threads(name, k, h):
     problem = problems.load(name)
-    program = HBVMProgram(problem.system, k=k, s=8, h=h)
+    program = HBVMProgram(problem.system, Plan(k=k, s=8, h=h))
     starts = problem.y0 * (1 + 0.1 * rng.uniform(-1, 1, size=(21, 1)))
     parameters = problem.par * (1 + 0.1 * rng.uniform(-1, 1, size=(21, 1)))
     starts[3] *= 40.0  # one that needs few iterations, one that leaves and does not arrive
@@ -142,7 +144,7 @@ def test_a_trajectory_is_the_same_bits_alone_in_any_place_and_on_any_threads(nam
 
 def test_energy_is_conserved_as_by_integrate():
     problem = problems.load("henon_heiles", energy=0.125, q2=0.1)
-    program = HBVMProgram(problem.system, k=8, s=8, h=0.5)
+    program = HBVMProgram(problem.system, Plan(k=8, s=8, h=0.5))
     starts = problem.y0 * (1 + 0.01 * rng.normal(size=(8, 4)))
     batch = program.batch(starts, times=[2000.0])
     for start, end in zip(starts, batch.y[:, 0], strict=True):
@@ -154,7 +156,7 @@ def test_small_rows_beside_larger_ones_that_move_do_not_keep_a_lane_iterating():
     problem = lattice(50)
     starts = np.zeros((8, 100))
     starts[:, 25] = np.linspace(0.9, 1.1, 8)  # all other places begin at 0
-    batch = HBVMProgram(problem.system, k=8, s=4, h=0.2).batch(starts, times=[10.0])
+    batch = HBVMProgram(problem.system, Plan(k=8, s=4, h=0.2)).batch(starts, times=[10.0])
     per_step = batch.iterations / batch.steps
     assert per_step.mean() < 16.65  # measured 16.545; without the movement of rows in their sizes 16.765
 
@@ -162,7 +164,7 @@ def test_small_rows_beside_larger_ones_that_move_do_not_keep_a_lane_iterating():
 def test_the_order_is_that_of_the_method():
     problem = problems.load("henon_heiles")
     ends = [
-        HBVMProgram(problem.system, k=4, s=2, h=h).batch([problem.y0], times=[4.0]).y[0, 0]
+        HBVMProgram(problem.system, Plan(k=4, s=2, h=h)).batch([problem.y0], times=[4.0]).y[0, 0]
         for h in (0.2, 0.1, 0.05)
     ]
     coarse, fine = (np.abs(ends[i] - ends[i + 1]).max() for i in (0, 1))
@@ -190,7 +192,7 @@ def test_one_failure_leaves_the_others_alone():
         return p[0] * p[0] / 2 - q[0] * m.sqrt(q[0])
 
     problem = Problem(Hamiltonian(H, dof=1, name="root"), q0=[1.0], p0=[0.0], t_end=4.0)
-    program = HBVMProgram(problem.system, k=4, s=4, h=0.25)
+    program = HBVMProgram(problem.system, Plan(k=4, s=4, h=0.25))
     starts = [[1.0, 0.0], [1.0, -2.0], [2.0, 0.5]]  # the second crosses q = 0
     times = np.arange(0.5, 4.1, 0.5)
     batch = program.batch(starts, times=times)
@@ -215,7 +217,7 @@ def test_what_becomes_no_number_in_the_last_sweeps_is_a_failure_of_its_lane(k, l
     )
     near = least + np.arange(-100, 100) * np.spacing(least)
     starts = np.stack([0.0 * near, 0.0 * near + 1.0, near], axis=1)
-    batch = HBVMProgram(system, k=k, s=4, h=h).batch(starts, times=[5 * h])
+    batch = HBVMProgram(system, Plan(k=k, s=4, h=h)).batch(starts, times=[5 * h])
     finished = np.array([status is Status.FINISHED for status in batch.status])
     assert 0 < finished.sum() < 200
     assert np.abs(batch.y[finished, 0, 0] - 5 * h).max() < 1e-15  # measured 0; or else a step
@@ -223,7 +225,7 @@ def test_what_becomes_no_number_in_the_last_sweeps_is_a_failure_of_its_lane(k, l
 
 def test_starts_and_parameters_of_the_wrong_shape_are_refused():
     problem = problems.load("kepler", e=0.5)
-    program = HBVMProgram(problem.system, k=4, s=4, h=0.1)
+    program = HBVMProgram(problem.system, Plan(k=4, s=4, h=0.1))
     for starts in ([[1.0, 2.0]], [], np.zeros((2, 2, 4)), [[1.0, 0.0, np.nan, 0.0]]):
         with pytest.raises(InputError):
             program.batch(starts, times=[1.0])
@@ -236,7 +238,7 @@ def test_starts_and_parameters_of_the_wrong_shape_are_refused():
 @pytest.mark.parametrize("solver", ["auto", "newton"])
 def test_what_needs_the_implicit_solver_is_in_a_batch_as_it_is_alone(solver):
     problem = problems.load("stiff_chain")
-    program = HBVMProgram(problem.system, k=4, s=2, h=0.5, solver=solver)
+    program = HBVMProgram(problem.system, Plan(k=4, s=2, h=0.5, solver=solver))
     starts = [problem.y0, 0.5 * problem.y0]
     times = np.array([2.3, 10.0])
     batch = program.batch(starts, times=times)
@@ -251,14 +253,14 @@ def test_what_needs_the_implicit_solver_is_in_a_batch_as_it_is_alone(solver):
 def test_a_system_too_large_for_lanes_goes_one_by_one(monkeypatch):
     monkeypatch.setattr(prepared, "ROOM", 10)
     problem = problems.load("kepler", e=0.5)
-    program = HBVMProgram(problem.system, k=8, s=4, h=0.1)
+    program = HBVMProgram(problem.system, Plan(k=8, s=4, h=0.1))
     assert program.in_lanes() is None
     batch = program.batch([problem.y0], times=[1.0])
     assert np.array_equal(batch.y[0], program.start(problem.y0).advance([1.0]).y)
 
 
 def test_a_batch_whose_members_have_all_failed_is_at_its_end():
-    program = HBVMProgram(problems.load("kepler").system, k=8, s=4, h=0.1)
+    program = HBVMProgram(problems.load("kepler").system, Plan(k=8, s=4, h=0.1))
     program.in_lanes()  # compiled
     started = perf_counter()
     batch = program.batch([[1.0, 0.0, 0.0, 0.0]] * 2, times=[0.5, 1e10])
@@ -270,7 +272,7 @@ def test_a_batch_whose_members_have_all_failed_is_at_its_end():
 @pytest.mark.parametrize("solver", ["newton", "blended"])
 def test_threads_share_the_work_of_an_implicit_solver_too(monkeypatch, solver):
     problem = problems.load("kepler", e=0.5)
-    program = HBVMProgram(problem.system, k=8, s=4, h=0.1, solver=solver)
+    program = HBVMProgram(problem.system, Plan(k=8, s=4, h=0.1, solver=solver))
     starts = problem.y0 * (1 + 0.05 * rng.normal(size=(6, 4)))
     alone, inner, names = program.batch(starts, times=[1.0]).y, Work.alone, set()
 
@@ -301,7 +303,7 @@ OWN = {
 def test_trajectories_with_adaptive_steps_in_lanes_are_those_of_integrate_up_to_the_tolerance(name):
     problem_name, values, times, close = OWN[name]
     problem = problems.load(problem_name, **values)
-    program = AdaptiveProgram(problem.system, k=16, s=14, tol=1e-15)
+    program = HBVMProgram(problem.system, Plan(k=16, s=14, tol=1e-15))
     starts = problem.y0 * (1 + 1e-2 * rng.normal(size=(20, 1)))
     parameters = problem.par * (1 + 1e-2 * rng.normal(size=(20, 1)))
     batch = program.batch(starts, parameters, times=times)
@@ -318,7 +320,7 @@ def test_trajectories_with_adaptive_steps_in_lanes_are_those_of_integrate_up_to_
 @pytest.mark.parametrize("name", ["kepler", "double_pendulum"])
 def test_adaptive_steps_in_lanes_are_the_same_bits_in_any_place_and_on_any_threads(name):
     problem = problems.load(name)
-    program = AdaptiveProgram(problem.system, k=8, s=7, tol=1e-12)
+    program = HBVMProgram(problem.system, Plan(k=8, s=7, tol=1e-12))
     n = 50  # lanes take up several, one after another
     starts = problem.y0 * (1 + 0.05 * rng.uniform(-1, 1, size=(n, 1)))
     parameters = problem.par * (1 + 0.1 * rng.uniform(-1, 1, size=(n, 1)))
@@ -347,7 +349,7 @@ def test_few_lanes_are_idle_while_trajectories_of_several_jobs_are_left(monkeypa
     calls = []
     monkeypatch.setattr(batch, "Pace", Every)
     morse = problems.load("morse", t_end=8.0)
-    program = AdaptiveProgram(morse.system, k=8, s=7, tol=1e-10)
+    program = HBVMProgram(morse.system, Plan(k=8, s=7, tol=1e-10))
     n, depths = 1024, np.linspace(0.7, 1.3, 1024)
     par = np.tile(morse.par, (n, 1))
     par[:, 0] *= np.random.default_rng(1).permutation(depths)
@@ -359,7 +361,7 @@ def test_few_lanes_are_idle_while_trajectories_of_several_jobs_are_left(monkeypa
 
 def test_adaptive_steps_keep_the_energy_of_eccentric_orbits():
     problem = problems.load("kepler", e=0.9)
-    program = AdaptiveProgram(problem.system, k=16, s=14, tol=1e-15)
+    program = HBVMProgram(problem.system, Plan(k=16, s=14, tol=1e-15))
     starts = problem.y0 * (1 + 1e-3 * rng.normal(size=(8, 1)))
     batch = program.batch(starts, times=[628.0])
     for start, end in zip(starts, batch.y[:, 0], strict=True):
@@ -372,7 +374,7 @@ def test_with_adaptive_steps_too_one_failure_leaves_the_others_alone():
         return p[0] * p[0] / 2 - q[0] * m.sqrt(q[0])
 
     problem = Problem(Hamiltonian(H, dof=1, name="root"), q0=[1.0], p0=[0.0], t_end=4.0)
-    program = AdaptiveProgram(problem.system, k=8, s=7, tol=1e-12)
+    program = HBVMProgram(problem.system, Plan(k=8, s=7, tol=1e-12))
     starts = [[1.0, 0.0], [1.0, -2.0], [2.0, 0.5]]  # the second crosses q = 0
     times = np.arange(0.5, 4.1, 0.5)
     batch = program.batch(starts, times=times)
@@ -388,12 +390,12 @@ def test_a_kink_and_a_stiff_system_go_one_by_one_from_adaptive_steps():
     def f(t, y, m):
         return [y[1], -y[0] - m.abs(y[0] - 0.3)]
 
-    kinked = AdaptiveProgram(VectorField(f, dim=2), k=8, s=6, tol=1e-10)
+    kinked = HBVMProgram(VectorField(f, dim=2), Plan(k=8, s=6, tol=1e-10))
 
     def g(t, y, m):
         return [-1e4 * (y[0] - m.cos(t))]
 
-    stiff = AdaptiveProgram(VectorField(g, dim=1), k=8, s=4, tol=1e-6)
+    stiff = HBVMProgram(VectorField(g, dim=1), Plan(k=8, s=4, tol=1e-6))
     for program, starts in ((kinked, np.array([[1.0, 0.0], [0.9, 0.1]])), (stiff, np.array([[1.0], [0.5]]))):
         batch = program.batch(starts, times=[10.0])
         assert (program.in_lanes() is None) == (program is kinked)
@@ -406,7 +408,7 @@ def test_a_kink_and_a_stiff_system_go_one_by_one_from_adaptive_steps():
 
 def test_each_of_many_times_costs_a_step_in_a_lane():
     problem = problems.load("kepler", e=0.99)
-    program = AdaptiveProgram(problem.system, k=16, s=14, tol=1e-15)
+    program = HBVMProgram(problem.system, Plan(k=16, s=14, tol=1e-15))
     times = np.linspace(0.0, 12.5, 501)[1:]
     stepper = program.start(problem.y0)
     expected = stepper.advance(times).y
@@ -416,7 +418,7 @@ def test_each_of_many_times_costs_a_step_in_a_lane():
 
 
 def test_what_is_next_to_nothing_leaves_its_lane():
-    program = AdaptiveProgram(VectorField(lambda y: [y[1], -y[0] - y[1]], dim=2), k=8, s=7, tol=1e-12)
+    program = HBVMProgram(VectorField(lambda y: [y[1], -y[0] - y[1]], dim=2), Plan(k=8, s=7, tol=1e-12))
     starts = np.array([[1.0, 0.0], [1.1, 0.0], [0.0, 0.0]])  # the last one stays at rest, in its lane
     batch = program.batch(starts, times=[1350.0])
     assert batch.status == [Status.FINISHED] * 3
@@ -429,8 +431,9 @@ def test_what_is_next_to_nothing_leaves_its_lane():
 
 def test_where_something_else_says_where_steps_end_they_go_one_by_one():
     system = problems.load("kepler").system
-    for more in ({"max_step": 0.1}, {"max_steps": 10}, {"breakpoints": [1.0]}):
-        assert AdaptiveProgram(system, k=8, s=7, tol=1e-10, **more).in_lanes() is None
+    plan = Plan(k=8, s=7, tol=1e-10)
+    for more in (replace(plan, max_step=0.1), replace(plan, max_steps=10), replace(plan, breakpoints=[1.0])):
+        assert HBVMProgram(system, more).in_lanes() is None
 
 
 @pytest.mark.parametrize("k", [7, 8, 16])

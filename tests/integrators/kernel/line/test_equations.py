@@ -6,6 +6,7 @@ import pytest
 import problems
 from integrators import HBVM, LineIntegral
 from integrators.coefficients.legendre import tables
+from integrators.kernel.plan import Plan
 from integrators.kernel.program import HBVMProgram
 from problems import targets
 
@@ -85,7 +86,7 @@ def test_a_vector_invariant_stands_for_its_components():
 
 def test_parameters_are_run_time_values():
     problem = problems.load("rigid_body", quartic=0.5, t_end=10.0)
-    program = HBVMProgram(problem.system, k=8, s=2, h=0.1, keep=["energy", "casimir"])
+    program = HBVMProgram(problem.system, Plan(k=8, s=2, h=0.1, keep=["energy", "casimir"]))
     ends = []
     for quartic in (0.5, 0.0):
         other = problems.load("rigid_body", quartic=quartic, t_end=10.0)

@@ -8,6 +8,7 @@ from integrators.kernel import routes
 from integrators.kernel.engines import iterations
 from integrators.kernel.native import binary, machine
 from integrators.kernel.native.around import Around
+from integrators.kernel.plan import Plan
 from integrators.kernel.program import HBVMProgram
 
 CASES = [
@@ -22,7 +23,7 @@ CASES = [
 
 
 def run(problem, settings, times):
-    stepper = HBVMProgram(problem.system, **settings).start(problem.y0, problem.par)
+    stepper = HBVMProgram(problem.system, Plan(**settings)).start(problem.y0, problem.par)
     return stepper.advance(times).y, stepper.stats
 
 
@@ -30,14 +31,14 @@ def run(problem, settings, times):
 def test_fused_sweeps_make_the_same_bits(name, settings, monkeypatch):
     problem = problems.load(name)
     times = np.arange(1, 60) * (0.7 * settings["h"])  # partial steps as well
-    program = HBVMProgram(problem.system, **settings)
+    program = HBVMProgram(problem.system, Plan(**settings))
     assert program.contexts()[0].fused != 0
     fused = run(problem, settings, times)
     other = not machine.many_registers()
     monkeypatch.setattr(machine, "many_registers", lambda: other)
     assert run(problem, settings, times)[0].tobytes() == fused[0].tobytes()
     monkeypatch.setattr(routes, "FEW_ROWS", 0)
-    assert HBVMProgram(problem.system, **settings).contexts()[0].fused == 0
+    assert HBVMProgram(problem.system, Plan(**settings)).contexts()[0].fused == 0
     alone = run(problem, settings, times)
     assert fused[0].tobytes() == alone[0].tobytes()
     assert fused[1] == alone[1]
@@ -45,7 +46,7 @@ def test_fused_sweeps_make_the_same_bits(name, settings, monkeypatch):
 
 def test_larger_systems_wider_methods_and_other_masses_are_not_fused():
     def fused(problem, **settings):
-        return HBVMProgram(problem.system, **settings).contexts()[0].fused != 0
+        return HBVMProgram(problem.system, Plan(**settings)).contexts()[0].fused != 0
 
     assert not fused(problems.load("outer_solar_system"), k=8, s=8, h=1.0)
     assert not fused(problems.load("kepler"), k=20, s=8, h=0.1)
@@ -55,7 +56,7 @@ def test_larger_systems_wider_methods_and_other_masses_are_not_fused():
 def test_a_step_is_solved_with_the_last_change_still_visible_and_its_effect_removed():
     """The field is evaluated at stages whose next change would be nothing."""
     problem = problems.load("kepler")
-    stepper = HBVMProgram(problem.system, k=16, s=16, h=0.2).start(problem.y0, problem.par)
+    stepper = HBVMProgram(problem.system, Plan(k=16, s=16, h=0.2)).start(problem.y0, problem.par)
     changes = []
     for n in range(1, 40):
         stepper.advance([0.2 * n])

@@ -5,6 +5,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from integrators.kernel.plan import Plan
 from integrators.kernel.program import HBVMProgram
 from problems import Hamiltonian, VectorField
 
@@ -32,7 +33,7 @@ H, STEPS = 0.3, 10
 )
 def test_increments_are_right_to_a_part_of_their_last_bit(system, k, s, most):
     start = np.linspace(10.0, 20.0, system.dim)
-    stepper = HBVMProgram(system, k=k, s=s, h=H).start(start)
+    stepper = HBVMProgram(system, Plan(k=k, s=s, h=H)).start(start)
     stepper.advance([STEPS * H])
     context = stepper._context
     assert context.counters.steps == STEPS

@@ -8,6 +8,7 @@ import problems
 from integrators.coefficients import legendre
 from integrators.kernel import tables
 from integrators.kernel.native import binary, stages
+from integrators.kernel.plan import Plan
 from integrators.kernel.program import HBVMProgram
 from integrators.protocol import Status
 from problems import Hamiltonian, Problem, VectorField, targets
@@ -89,7 +90,7 @@ def reference(problem, k, s, h, steps, t0=0.0):
 
 
 def steps_of(problem, k, s, h, steps, form=None, t0=0.0):
-    program = HBVMProgram(problem.system, k=k, s=s, h=h, form=form)
+    program = HBVMProgram(problem.system, Plan(k=k, s=s, h=h, form=form))
     stepper = program.start(problem.y0, problem.par, t0)
     states = []
     for _ in range(steps):
@@ -111,7 +112,7 @@ def test_steps_are_the_methods_own_to_rounding(chain, k, s, form):
 @pytest.mark.parametrize(("k", "s", "h"), [(8, 8, -0.3), (16, 5, 0.5), (3, 3, 1e-6), (18, 2, 0.1)])
 def test_factors_in_the_matrix_change_nothing(equal, k, s, h):
     expected = reference(equal, k, s, h, 4)
-    stepper = HBVMProgram(equal.system, k=k, s=s, h=abs(h)).start(equal.y0)
+    stepper = HBVMProgram(equal.system, Plan(k=k, s=s, h=abs(h))).start(equal.y0)
     found = stepper.advance(np.arange(1, 5) * h).y
     assert np.abs(found - expected).max() < 3e-16  # measured 1.2e-16
 
@@ -176,7 +177,7 @@ def test_two_steps_are_extrapolated_exactly_as_far_as_their_values_tell(k):
 
 def test_two_steps_give_eight_stages_a_better_start():
     problem = problems.load("outer_solar_system")
-    stepper = HBVMProgram(problem.system, k=8, s=8, h=1.0).start(problem.y0)
+    stepper = HBVMProgram(problem.system, Plan(k=8, s=8, h=1.0)).start(problem.y0)
     stepper.advance([1000.0])
     iterations, steps = stepper._context.counters.iterations, stepper._context.counters.steps
     assert iterations < 6.3 * steps  # measured 5.9, from one step 6.7
@@ -187,7 +188,7 @@ def test_divergence_and_nan_are_outcomes_with_a_time(chain):
         return [m.sqrt(1.0 - t) * y[0]]
 
     stepper = HBVMProgram(
-        VectorField(f, dim=1, name="until_one"), k=4, s=4, h=0.3, solver="fixed_point"
+        VectorField(f, dim=1, name="until_one"), Plan(k=4, s=4, h=0.3, solver="fixed_point")
     ).start([1.0])
     samples = stepper.advance(np.arange(0.0, 3.0, 0.3))
     assert samples.status is stepper.status is Status.NOT_FINITE
@@ -200,7 +201,7 @@ def test_divergence_and_nan_are_outcomes_with_a_time(chain):
         return [m.exp(y[0])]
 
     stepper = HBVMProgram(
-        VectorField(overflow, dim=1, name="blow_up"), k=4, s=4, h=0.5, solver="fixed_point"
+        VectorField(overflow, dim=1, name="blow_up"), Plan(k=4, s=4, h=0.5, solver="fixed_point")
     ).start([3.0])
     assert stepper.step() in (Status.NONLINEAR_DIVERGENCE, Status.NOT_FINITE)
     assert stepper.y == [3.0]
@@ -229,7 +230,7 @@ def test_a_field_that_cannot_run_on_lanes_runs_stage_by_stage(chain, driven, mon
 @pytest.mark.parametrize("q", [5e-324, 2.2e-309, 1e-201])
 def test_a_start_too_small_to_divide_by_is_as_good_as_zero(q):
     problem = problems.load("pendulum")
-    program = HBVMProgram(problem.system, k=8, s=4, h=0.1)
+    program = HBVMProgram(problem.system, Plan(k=8, s=4, h=0.1))
     tiny, zero = (program.start([start, 0.375], problem.par).advance([10.0]) for start in (q, 0.0))
     assert tiny.status is Status.FINISHED
     assert np.abs(tiny.y - zero.y).max() < 1e-14  # measured 0
