@@ -1,6 +1,6 @@
 """Integrate a problem with a method: the one function most users need."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from math import isfinite
@@ -34,9 +34,10 @@ from integrators.protocol import (
     offers,
 )
 from integrators.refusals import check_interval, check_times
+from integrators.running.course import Course
 from integrators.running.digits import check_digits, pairs
 from integrators.running.variations import follow
-from integrators.running.watch import SOON, Bar, Report, Watch, both, identity, read
+from integrators.running.watch import SOON, Bar, Report, Watch, identity, read
 from integrators.solution.record import Solution, solution_of
 from problems import limits
 from problems.analysis.tables import check_tables
@@ -180,108 +181,64 @@ def integrate(
         stepper = started(program, method, problem, wanted, problem.y0, problem.par, problem.t0, end)
     else:
         stepper = cast("DoubleDouble", program).start_pairs(begin, problem.par, problem.t0)
-    lows = None if begin is None else [np.empty((0, problem.system.dim))]
     if (checkpoint is not None or resume is not None) and not offers(stepper, Checkpoints):
         raise InputError(f"{method!r} has no checkpoints; leave out checkpoint= and resume=.")
     if grid.size and offers(stepper, Destination):
         stepper.destination = end
-    vectors: list[Array] | None = None
-    directions: tuple[Array, Array] | None = None
-    if variations is not None:
-        directions = follow(stepper, method, problem, variations, sample)
-        vectors = [np.empty((0, *directions[0].shape))]
-    t: list[Array] = []
-    y: list[Array] = []
-    done = 0
-    lost: Losses = {}
-    here, status, reason, before = problem.t0, Status.FINISHED, "", None
+    directions = None if variations is None else follow(stepper, method, problem, variations, sample)
+    course = Course.begun(problem.t0, problem.system.dim, directions, begin is not None)
     if kept is not None:
-        stepper.restore(kept["stepper"])
-        t, y, done = [kept["t"]], [kept["y"]], kept["made"]
-        here, status, reason, before = kept["here"], kept["status"], kept["reason"], kept["stats"]
-        vectors = None if vectors is None else [kept["variations"]]
-        lows = None if lows is None else [kept["low"]]
-        lost = kept.get("losses", lost)
+        course.resume(kept, stepper)
         if wanted:
             stepper.search.load(kept["search"])
-
-    by_steps = watch is not None and watch.looks and _goes_by_steps(stepper, sample)
-    length = abs(end - problem.t0) * (FIRST if watch is not None and watch.looks else UNSEEN)
-    if watch is None and sample != "steps" and offers(stepper, TimeLimit):
-        stepper.time_limit, length = SOON, np.inf
+    conserves = sample != "dense" and not acting
     try:
-        while done < grid.size and status is Status.FINISHED:
-            piece, how, count = grid[done:], sample, grid.size - done
-            if length < np.inf:
-                piece, how, count = _next_piece(grid, done, here, length, sample, by_steps)
-            began = perf_counter()
-            samples = stepper.advance(piece, sample=how)
-            if length < np.inf:
-                length *= _growth(perf_counter() - began)
-            status, reason = samples.status, samples.reason
-            in_time = how == "steps" or samples.t.size == piece.size
-            here = float((piece if in_time else samples.t)[-1]) if status is Status.FINISHED else stepper.t
-            if how == sample:
-                t.append(samples.t)
-                y.append(samples.y)
-                if vectors is not None:
-                    vectors.append(stepper.variations)
-                if lows is not None:
-                    lows.append(stepper.low)
-                done += count if sample == "steps" else samples.t.size
-            if watch is not None:
-                stats = stepper.stats.copy() if before is None else both(before, stepper.stats)
-                if watch.due and samples.t.size and sample != "dense" and not acting:
-                    lost = _lost(problem, method, samples, stats.steps) | lost
-                if watch.keeps:
-                    t, y = ([part] for part in _joined(t, y, problem.system.dim))
-                    vectors = None if vectors is None else [np.concatenate(vectors)]
-                    lows = None if lows is None else [np.concatenate(lows)]
-                    watch.keep(
-                        {"stepper": stepper.checkpoint(), "t": t[0], "y": y[0], "made": done, "here": here}
-                        | {"status": status, "reason": reason, "stats": stats, "losses": lost}
-                        | ({"search": stepper.search.save()} if wanted else {})
-                        | ({} if vectors is None else {"variations": vectors[0]})
-                        | ({} if lows is None else {"low": lows[0]})
-                    )
-                watch.look(here, stats.steps)
-        if wanted and grid.size and status is Status.FINISHED:
+        for samples in _pieces(course, stepper, grid, sample, end, watch):
+            if watch is None:
+                continue
+            steps = course.stats(stepper).steps
+            if conserves and watch.due and samples.t.size:
+                course.losses = _lost(problem, method, samples, steps) | course.losses
+            if watch.keeps:
+                watch.keep(course.kept(stepper) | ({"search": stepper.search.save()} if wanted else {}))
+            watch.look(course.here, steps)
+        if wanted and grid.size and course.status is Status.FINISHED:
             stepper.look_to(end)
     except KeyboardInterrupt:
-        status, reason = Status.INTERRUPTED, "Ctrl-C was pressed."
+        course.status, course.reason = Status.INTERRUPTED, "Ctrl-C was pressed."
     if watch is not None:
         watch.write()
-    failed = status not in (Status.FINISHED, Status.INTERRUPTED) and status.failed
-    if failed and vectors is None and stepper.t != problem.t0 and not any(part.size for part in t):
-        t, y = [np.array([stepper.t])], [stepper.y[np.newaxis]]  # the last state that was reached
-        lows = None if lows is None else [np.zeros_like(y[0])]
+    failed = course.status not in (Status.FINISHED, Status.INTERRUPTED) and course.status.failed
+    if failed and directions is None and stepper.t != problem.t0 and course.empty:
+        course.replace(stepper.t, stepper.y)  # the last state that was reached
 
     error = stepper.error if failed and offers(stepper, KeptError) else None
-    if (
-        status is Status.USER_ERROR and error is not None and stepper.t == problem.t0
-    ):  # nothing is reached that could be kept
-        raise error
-    stats = stepper.stats if before is None else both(before, stepper.stats)
+    if course.status is Status.USER_ERROR and error is not None and stepper.t == problem.t0:
+        raise error  # nothing is reached that could be kept
+    stats = course.stats(stepper)
+    extra: dict[str, Any] = {}
     if isinstance(problem.system, Opaque):
-        stats.extra = {**stats.extra, "field": problem.system.written}
+        extra["field"] = problem.system.written
     if watch is not None and watch.failure:
-        stats.extra = {**stats.extra, "checkpoint": watch.failure}
-    if lost:
-        stats.extra = {**stats.extra, "losses": lost}
+        extra["checkpoint"] = watch.failure
+    if course.losses:
+        extra["losses"] = course.losses
     if sample == "dense":  # the polynomials conserve nothing
-        stats.extra = {**stats.extra, "sample": sample}
-    reached, states = _joined(t, y, problem.system.dim)
+        extra["sample"] = sample
+    if extra:
+        stats.extra = {**stats.extra, **extra}
+    made = course.arrays()
     solution = solution_of(
-        t=reached,
-        y=states,
+        t=made["t"],
+        y=made["y"],
         events={},
-        variations=None if vectors is None else np.concatenate(vectors),
+        variations=made.get("variations"),
         directions=directions,
-        low=None if lows is None else np.concatenate(lows),
+        low=made.get("low"),
         start=begin,
-        status=status,
-        reason=reason,
-        t_stop=float(reached[-1]) if status is Status.FINISHED and reached.size else here,
+        status=course.status,
+        reason=course.reason,
+        t_stop=float(made["t"][-1]) if course.status is Status.FINISHED and made["t"].size else course.here,
         stats=stats,
         compile_seconds=program.compile_seconds - (known or 0.0),
         from_cache=program.from_cache if known is None else program.from_cache is not None or None,
@@ -290,6 +247,32 @@ def integrate(
         error=error,
     )
     return _with_events(solution, stepper.search, keeps=grid.size > 0) if wanted else solution
+
+
+def _pieces(
+    course: Course, stepper: Any, grid: Array, sample: str | None, end: float, watch: Watch | None
+) -> Iterator[Samples]:
+    """Advance to all times in pieces, as long as nothing ends that; yield the samples of each."""
+    by_steps = watch is not None and watch.looks and _goes_by_steps(stepper, sample)
+    length = abs(end - course.start) * (FIRST if watch is not None and watch.looks else UNSEEN)
+    if watch is None and sample != "steps" and offers(stepper, TimeLimit):
+        stepper.time_limit, length = SOON, np.inf
+    while course.made < grid.size and course.status is Status.FINISHED:
+        piece, how, count = grid[course.made :], sample, grid.size - course.made
+        if length < np.inf:
+            piece, how, count = _next_piece(grid, course.made, course.here, length, sample, by_steps)
+        began = perf_counter()
+        samples = stepper.advance(piece, sample=how)
+        if length < np.inf:
+            length *= _growth(perf_counter() - began)
+        course.status, course.reason = samples.status, samples.reason
+        in_time = how == "steps" or samples.t.size == piece.size
+        reached = (piece if in_time else samples.t)[-1] if course.status is Status.FINISHED else stepper.t
+        course.here = float(reached)
+        if how == sample:
+            course.add(samples, stepper)
+            course.made += count if sample == "steps" else samples.t.size
+        yield samples
 
 
 def _lost(problem: Problem, method: MethodBase, samples: Samples, steps: int) -> Losses:
@@ -367,13 +350,6 @@ def _next_piece(
         return np.array([goal]), "steps", 0
     count = max(count, 1)
     return grid[taken : taken + count], sample, count
-
-
-def _joined(t: list[Array], y: list[Array], dim: int) -> tuple[Array, Array]:
-    """Return pieces of times and states as one array each, of its own."""
-    if len(t) == 1:
-        return t[0].copy(), y[0].copy()
-    return (np.concatenate(t), np.concatenate(y)) if t else (np.empty(0), np.empty((0, dim)))
 
 
 def _growth(seconds: float) -> float:
