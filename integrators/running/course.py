@@ -53,8 +53,12 @@ class Course:
     def add(self, samples: Samples, stepper: Any) -> None:
         """Add the samples of a stepper's last ``advance``."""
         made = {"t": samples.t, "y": samples.y}
+        if "variations" in self.parts:
+            made["variations"] = stepper.variations
+        if "low" in self.parts:
+            made["low"] = stepper.low
         for name, pieces in self.parts.items():
-            pieces.append(made[name] if name in made else getattr(stepper, name))
+            pieces.append(made[name])
 
     def arrays(self) -> dict[str, Array]:
         """Return each of the parts in one piece, an array of its own."""
