@@ -24,7 +24,6 @@ from integrators.kernel.context import Context
 from integrators.kernel.engines import run, run_own
 from integrators.kernel.ensemble.group import LEFT
 from integrators.kernel.ensemble.prepared import Lanes
-from integrators.kernel.implicit.workspace import Solver
 from integrators.kernel.pace import Pace
 from integrators.kernel.plan import Plan
 from integrators.kernel.stepper import HBVMStepper
@@ -62,7 +61,6 @@ class BatchProgram(Protocol):
     h: float
     plan: Plan
     adaptive: AdaptiveSteps | None
-    solver: Solver
 
     def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> HBVMStepper: ...
     def in_lanes(self) -> Lanes | None: ...
@@ -300,7 +298,6 @@ class Adaptive(_InLanes):
         contexts, adaptive = self.contexts(), self.work.program.adaptive
         assert adaptive is not None
         for context, *_ in contexts:
-            context.implicit.strategy = self.work.program.solver.strategy
             context.controller.interval = float(abs(self.work.result.t[-1] - self.work.t0))
             adaptive.limit(context, context.controller.interval)
         group, _ = self.lanes.groups(self.work.t0, self.h, self.numbers, self.arrays)

@@ -342,15 +342,26 @@ class HBVMProgram(Compiled):
 
     def contexts(self) -> tuple[Context, Context]:
         """Return fresh memory for a trajectory, and for its partial steps."""
-        own, partial = self._context(partial=False).copy(), self._context(partial=True).copy()
+        own, partial = self._fresh_one(partial=False).copy(), self._fresh_one(partial=True).copy()
         if self.kept:
             self.kept.share(own, partial)
         return own, partial
 
-    def _context(self, *, partial: bool) -> Context:
+    def _fresh_one(self, *, partial: bool) -> Context:
+        """Return fresh memory to copy, made the first time."""
         if partial not in self._fresh:
-            # when it is complete: another thread may copy it at once
-            self._fresh[partial] = self._new_context(partial=partial)
+            tables = {**self._fixed, **({} if partial or self.varying else self.scaled(self.h))}
+            more = self.adaptive.more if self.adaptive else {}
+            kept = self.kept
+            context = kept.context(self.shape, tables) if kept else Context(self.shape, tables, more)
+            context.solver.tolerance, context.solver.stagnation = TOLERANCE, STAGNATION
+            context.solver.log_residual = LOG_RESIDUAL
+            if self.adaptive:
+                self.adaptive.set(context)
+            if not partial:
+                context.h, context.implicit.strategy = self.h, self.solver.strategy
+                context.controller.next_length = (self.plan.h or 0.0) if self.varying else 0.0
+            self._fresh[partial] = context  # when it is complete: another thread may copy it at once
         return self._fresh[partial]
 
     def pair(self, par: Array) -> Pair:
@@ -358,34 +369,17 @@ class HBVMProgram(Compiled):
         pair = self.spare.take()
         if pair is None:
             pair = Pair(*self.contexts())
-            self._put(pair.own, pair.partial, par)
+            self.renew(pair.own, pair.partial, par)
             return pair
         if not pair.renew():
-            pair.own.become(self._context(partial=False))
-            pair.partial.become(self._context(partial=True))
+            pair.own.become(self._fresh_one(partial=False))
+            pair.partial.become(self._fresh_one(partial=True))
             if self.kept:
                 self.kept.share(pair.own, pair.partial)
         if pair.par != (key := par.tobytes()):
-            self._put(pair.own, pair.partial, par)
+            self.renew(pair.own, pair.partial, par)
             pair.keep(key)
         return pair
-
-    def _new_context(self, *, partial: bool) -> Context:
-        tables = {**self._fixed, **({} if partial or self.varying else self.scaled(self.h))}
-        more = self.adaptive.more if self.adaptive else {}
-        context = self.kept.context(self.shape, tables) if self.kept else Context(self.shape, tables, more)
-        context.solver.tolerance, context.solver.stagnation = TOLERANCE, STAGNATION
-        context.solver.log_residual = LOG_RESIDUAL
-        if self.adaptive:
-            self.adaptive.set(context)
-        return context
-
-    def _put(self, own: Context, partial: Context, par: Array) -> None:
-        """Put parameters, and what follows from them, into fresh memory."""
-        self.renew(own, partial, par)
-        own.h, own.implicit.strategy = self.h, self.solver.strategy
-        if self.varying:
-            own.controller.next_length = self.plan.h or 0.0
 
     def renew(self, own: Context, partial: Context, par: Array) -> None:
         """Put parameters and the velocities by momentum that they make into the memory of a trajectory."""
