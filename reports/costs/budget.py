@@ -1,6 +1,6 @@
 """What an iteration of the kernel costs, beside what the processor could do at best.
 
-``python -m integrators.kernel.budget "outer_solar_system" --k 8 --s 8`` counts the
+``python reports/costs/budget.py "outer_solar_system" --k 8 --s 8`` counts the
 operations of the vector field and of the product, and measures the time of an
 iteration and of what a step needs besides; ``--assembly`` prints the field's machine
 code instead. ``docs/kernel.md`` reads an example.

@@ -3,9 +3,11 @@
 import pytest
 
 import problems
-from integrators.kernel import budget
 from integrators.kernel.native.field import assembly
 from problems import targets
+from tests.hbvm_bench.study_folders import module
+
+budget = module("costs", "budget")
 
 
 def test_the_operations_of_a_field_are_counted_without_those_of_parameters():
