@@ -1,6 +1,5 @@
 """What an integration has made so far, piece by piece: its samples, and how it stands."""
 
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -10,15 +9,25 @@ from integrators.protocol import Array, Samples, Stats, Status
 from integrators.running.watch import both
 
 
-@dataclass
 class Course:
     """Samples in pieces, what goes with each of them, and how the integration stands.
+
+    Parameters
+    ----------
+    t0 : float
+        Where it begins.
+    dim : int
+        Length of a state.
+    directions : tuple of ndarray or None
+        Those of tangent vectors, if there are any.
+    low : bool
+        Whether samples have low parts.
 
     Attributes
     ----------
     parts : dict of str to list of ndarray
         ``"t"`` and ``"y"``, with ``"variations"`` and ``"low"`` where these are asked for: pieces that follow
-        one another, an empty one first.
+        one another.
     start, here : float
         Where it begins, and how far it has come.
     made : int
@@ -31,24 +40,17 @@ class Course:
         Of what was made before it was resumed.
     """
 
-    parts: dict[str, list[Array]]
-    start: float
-    here: float
-    made: int = 0
-    status: Status = Status.FINISHED
-    reason: str = ""
-    losses: Losses = field(default_factory=dict)
-    earlier: Stats | None = None
-
-    @classmethod
-    def begun(cls, t0: float, dim: int, directions: tuple[Array, Array] | None, low: bool) -> "Course":
-        """Return one with nothing made; ``directions`` are those of tangent vectors, if there are any."""
-        parts = {"t": [np.empty(0)], "y": [np.empty((0, dim))]}
+    def __init__(self, t0: float, dim: int, directions: tuple[Array, Array] | None, low: bool):
+        self.start = self.here = t0
+        self.parts: dict[str, list[Array]] = {"t": [], "y": []}
+        self._nothing = {"t": np.empty(0), "y": np.empty((0, dim))}
         if directions is not None:
-            parts["variations"] = [np.empty((0, *directions[0].shape))]
+            self.parts["variations"], self._nothing["variations"] = [], np.empty((0, *directions[0].shape))
         if low:
-            parts["low"] = [np.empty((0, dim))]
-        return cls(parts, t0, t0)
+            self.parts["low"], self._nothing["low"] = [], self._nothing["y"]
+        self.made, self.status, self.reason = 0, Status.FINISHED, ""
+        self.losses: Losses = {}
+        self.earlier: Stats | None = None
 
     def add(self, samples: Samples, stepper: Any) -> None:
         """Add the samples of a stepper's last ``advance``."""
@@ -62,8 +64,10 @@ class Course:
 
     def arrays(self) -> dict[str, Array]:
         """Return each of the parts in one piece, an array of its own."""
-        whole = {name: np.concatenate(pieces) for name, pieces in self.parts.items()}
-        self.parts = {name: [array] for name, array in whole.items()}
+        whole = {}
+        for name, pieces in self.parts.items():
+            one = pieces[0].copy() if len(pieces) == 1 else np.concatenate([self._nothing[name], *pieces])
+            whole[name], self.parts[name] = one, [one]
         return whole
 
     def replace(self, t: float, y: Array) -> None:

@@ -186,7 +186,7 @@ def integrate(
     if grid.size and offers(stepper, Destination):
         stepper.destination = end
     directions = None if variations is None else follow(stepper, method, problem, variations, sample)
-    course = Course.begun(problem.t0, problem.system.dim, directions, begin is not None)
+    course = Course(problem.t0, problem.system.dim, directions, begin is not None)
     if kept is not None:
         course.resume(kept, stepper)
         if wanted:
