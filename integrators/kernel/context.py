@@ -162,24 +162,25 @@ class Context(Memory):
     s = Integer()  # degree
 
     # --- where it is ---
-    h = Real()
-    t0 = Real()
-    time_low = Real()  # what `t0` lacks
-    n = Integer()  # steps since `t0`
+    h = Real(lasting=True)
+    t0 = Real(lasting=True)
+    time_low = Real(lasting=True)  # what `t0` lacks
+    n = Integer(lasting=True)  # steps since `t0`
     samples_written = Integer()  # samples
-    state = Array(2, "padded")  # second-order form: blocks [p p p p q q q q]; first-order form: y
-    error = Array(2, "padded")  # what `state` lacks, in the same places
-    next_state = Array(2, "padded")
-    next_error = Array(2, "padded")
+    # Second-order form: blocks [p p p p q q q q]; first-order form: y
+    state = Array(2, "padded", lasting=True)
+    error = Array(2, "padded", lasting=True)  # what `state` lacks, in the same places
+    next_state = Array(2, "padded", lasting=True)
+    next_error = Array(2, "padded", lasting=True)
 
     # --- the step ahead, and the steps before it ---
-    solved = Integer()  # what solves the step ahead: UNSOLVED, BY_VALUES, BY_INCREMENT
+    solved = Integer(lasting=True)  # what solves the step ahead: UNSOLVED, BY_VALUES, BY_INCREMENT
     times = Array("calls", "lanes")
     stages = Array(*STAGE)
-    values = Array(*STAGE)  # of the field
-    older_values = Array(*STAGE)  # of the step before
-    length = Real()  # of the step that `values` belong to; 0: none
-    older_length = Real()  # of the one that `older_values` belong to, right before that; 0: none
+    values = Array(*STAGE, lasting=True)  # of the field
+    older_values = Array(*STAGE, lasting=True)  # of the step before
+    length = Real(lasting=True)  # of the step that `values` belong to; 0: none
+    older_length = Real(lasting=True)  # of the one that `older_values` belong to, right before that; 0: none
 
     # --- parts ---
     tables = Within(Tables)

@@ -6,9 +6,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from operator import attrgetter
 from time import perf_counter
-from typing import Any, ClassVar, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -59,7 +58,6 @@ from integrators.protocol import (
 )
 from integrators.refusals import check_times, one_thread
 from integrators.running.checkpoints import Identity
-from integrators.running.times import Counts
 from integrators.running.watchdog import StallDetector
 from integrators.undefined import where_undefined
 from problems.errors import InputError, unknown
@@ -116,8 +114,8 @@ class Checkpoint:
     """All that the continuation of a stepper depends on."""
 
     identity: Identity
-    words: Counts
-    arrays: tuple[Array, ...]
+    words: dict[str, int]
+    arrays: dict[str, Array]
     implicit: tuple[Any, ...] | None
     taken: int  # steps since the trajectory's start
     status: Status
@@ -147,34 +145,6 @@ class HBVMStepper(ABC):
         conserve the energy.
     """
 
-    # What a checkpoint holds; the values matter to the next start.
-    _words: ClassVar[tuple[str, ...]] = (
-        "h", "t0", "n", "length", "older_length", "solved", "blocks.age", "solver.free", "solver.rate",
-        "implicit.active", "implicit.slow", "implicit.held", "implicit.left", "time_low",
-        "controller.next_length", "controller.length_after", "controller.previous_length",
-        "controller.previous_error", "controller.error_ahead", "controller.previous_quadrature_error",
-        "controller.quadrature_error_ahead", "controller.length_limit", "discontinuities.count",
-        "discontinuities.end",
-        "discontinuities.doubt_end",
-        "discontinuities.boundary", "discontinuities.next_boundary", "discontinuities.resolution",
-        "previous.t0", "previous.time_low",
-        "events.seen", "events.acting",
-        "events.time", "events.length_before", "events.acted", "events.repeated", "surfaces.reached",
-        "surfaces.on_surface",
-        "surfaces.row", "surfaces.length_wanted", "previous.on_surface", "pace.epsilon", "pace.log_density",
-        "pace.previous_log_density", "pace.density_slope", "controller.interval", "controller.no_time_scale",
-        "estimate.constant_field", "estimate.rescaled", "estimate.borrowed", "estimate.asks", "energy.start",
-        "energy.scale", "solver.tolerance", "solver.stagnation", "solver.trusted", "solver.log_trusted",
-        "solver.log_residual", "estimate.noisy", "estimate.troubles", "estimate.next_look",
-        "estimate.spacing",
-    )  # fmt: skip
-    _arrays: ClassVar[tuple[str, ...]] = (
-        "state", "error", "next_state", "next_error", "values", "older_values", "blocks.weights",
-        "blocks.floored_weights", "discontinuities.records", "discontinuities.boundary_values",
-        "discontinuities.previous_boundary_values", "discontinuities.last_coefficients",
-        "discontinuities.previous_last_coefficients", "previous.state", "previous.error", "estimate.expected",
-        "estimate.largest", "estimate.noise", "blocks.terms",
-    )  # fmt: skip
     error: Exception | None = None
     """What a function of the user raised, where the status is ``USER_ERROR``."""
     search: LastingSearch | None = None
@@ -497,23 +467,12 @@ class HBVMStepper(ABC):
         if self._context.solved:
             self._context.solved, self._context.length = 0, 0.0
 
-    @property
-    def _indices(self) -> list[int]:
-        """Words of a checkpoint."""
-        return [self._context.word_of[name] for name in self._words]
-
-    @property
-    def _kept(self) -> tuple[str, ...]:
-        """Arrays of a checkpoint."""
-        return self._arrays + (self._program.kept.arrays if self._program.kept else ())
-
     @one_thread
     def checkpoint(self) -> Checkpoint:
         """Return a copy of all that the continuation depends on."""
         return Checkpoint(
             self._identity,
-            self._context.words[self._indices],
-            tuple(array.copy() for array in attrgetter(*self._kept)(self._context)),
+            *self._context.lasting(),
             None if self._implicit is None else self._implicit[0].save(),
             self._taken,
             self._status,
@@ -539,19 +498,18 @@ class HBVMStepper(ABC):
             raise InputError(
                 "this checkpoint has no tangent vectors, or others; restore it before any follow."
             )
-        arrays = attrgetter(*self._kept)(self._context)
-        sizes = len(self._indices), [array.shape for array in arrays]
-        if (checkpoint.words.size, [array.shape for array in checkpoint.arrays]) != sizes:
+        words, arrays = checkpoint.words, checkpoint.arrays
+        shapes = {name: array.shape for name, array in self._context.lasting()[1].items()}
+        known = isinstance(words, dict) and words.keys() == self._context.lasting_words.keys()
+        if not known or {name: array.shape for name, array in arrays.items()} != shapes:
             raise InputError(
                 "this checkpoint is of another version of hbvm-bench, whose steps depend on other numbers; "
                 "restore it with that version, or begin anew."
             )
         if checkpoint.par is not None:
             self._renew(checkpoint.par)
-        self._context.words[self._indices] = checkpoint.words
+        self._context.go_on(words, arrays)
         self._set_step(self._context.h)
-        for array, kept in zip(arrays, checkpoint.arrays, strict=True):
-            array[:] = kept
         if checkpoint.implicit is not None:
             self._make_implicit()[0].restore(checkpoint.implicit)
         if self._vectors is not None and checkpoint.vectors is not None:

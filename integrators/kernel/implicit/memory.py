@@ -68,7 +68,7 @@ class Corrections(Memory):
 
     # --- the unknowns ---
     gamma = Array("parts", "block")
-    increment = Table("dim")  # h gamma_0, what the step adds to the state
+    increment = Table("dim", lasting=True)  # h gamma_0, what the step adds to the state
     predicted = Array("parts", "block")
     residual = Array("parts", "block")
     correction = Array("parts", "block")
@@ -76,16 +76,17 @@ class Corrections(Memory):
     factor = Table("rows")  # h, or h^2 q'/p in the second-order form
     slope_weights = Table("rows")  # 1 / size of a row's block in h q', second-order form
     floored_slope_weights = Table("rows")  # small blocks raised
-    predict = Integer()  # 1: the extrapolated start is nearer than the constant one
-    change = Real()  # of the last correction
-    rate = Real()  # by which corrections have contracted with this Jacobian; 1 where that is not known
-    contraction = Real()  # by which one fixed-point iteration contracts, an estimate ...
-    contraction_h = Real()  # ... of a step of this length
+    predict = Integer(lasting=True)  # 1: the extrapolated start is nearer than the constant one
+    change = Real(lasting=True)  # of the last correction
+    # By which corrections have contracted with this Jacobian; 1 where that is not known
+    rate = Real(lasting=True)
+    contraction = Real(lasting=True)  # by which one fixed-point iteration contracts, an estimate ...
+    contraction_h = Real(lasting=True)  # ... of a step of this length
 
     # --- the Jacobian and the factors ---
     entry_rows = Table("entry_count", kind=int)
     entry_columns = Table("entry_count", kind=int)
-    entries = Table("entry_count")
+    entries = Table("entry_count", lasting=True)
     columns = Table("grouped", kind=int)  # group by group
     column_groups = Table("grouped", kind=int)  # of each column
     column_starts = Table("group_ends", kind=int)  # of each group in `columns`
@@ -98,10 +99,10 @@ class Corrections(Memory):
     ends = Array("lu_rows", kind=int)
     whole_matrix = Array("whole_size")
     whole_x = Array("whole")
-    linearized = Integer()  # 1: the entries are those at `state`
-    stale = Integer()  # 1: take a new Jacobian at the next step
-    since = Integer()  # steps since the Jacobian was taken
-    factored_h = Real()  # length of the step that the factors are for
+    linearized = Integer(lasting=True)  # 1: the entries are those at `state`
+    stale = Integer(lasting=True)  # 1: take a new Jacobian at the next step
+    since = Integer(lasting=True)  # steps since the Jacobian was taken
+    factored_h = Real(lasting=True)  # length of the step that the factors are for
 
     # --- room ---
     slopes = Table("unknowns")

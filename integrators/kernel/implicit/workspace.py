@@ -213,16 +213,16 @@ class Workspace(Corrections):
 
     def save(self) -> tuple[Any, ...]:
         """Return copies of all that the continuation depends on."""
-        return self.words[_LASTING], self.increment.copy(), self.entries.copy()
+        return self.lasting()
 
     def restore(self, saved: tuple[Any, ...]) -> None:
         """Go back to what `save` returned; the counters of the work done keep counting."""
-        self.words[_LASTING], self.increment[:], self.entries[:] = saved
+        self.go_on(*saved)
         self.factored = 0
 
     def forget(self) -> None:
         """Forget the previous steps; the counters of the work done keep counting."""
-        self.words[_LASTING] = 0
+        self.words[list(self.lasting_words.values())] = 0
         self.factored = 0
 
     def raise_what_is_no_failure(self) -> None:
@@ -242,16 +242,6 @@ def _in_eights(rows: Any) -> Any:
     flat = aligned(parts.size)
     flat[:] = parts.reshape(-1)
     return flat.reshape(-1, *rows.shape[1:])
-
-
-# What goes from step to step, but for the factors, which follow from the Jacobian's entries.
-_LASTING = [
-    slot.index
-    for slot in (
-        Workspace.linearized, Workspace.stale, Workspace.predict, Workspace.since, Workspace.factored_h,
-        Workspace.change, Workspace.rate, Workspace.contraction, Workspace.contraction_h,
-    )
-]  # fmt: skip
 
 
 def report(own: Workspace, part: Workspace) -> dict[str, Any]:

@@ -19,14 +19,15 @@ class LineContext(Context):
     invariants = Integer()  # how many
     every = Integer()  # rows that it writes
     measure = Pointer()  # what writes the gradients and then the invariants themselves
-    gradients = Array("calls", "every", "lanes")  # in the layout of stage memory
+    gradients = Array("calls", "every", "lanes", lasting=True)  # in the layout of stage memory
     remainders = Array("calls", "every", "lanes")  # what their first s coefficients leave of the rows
-    legendre = Array("coefficient_groups", "every", 8)  # these coefficients
+    legendre = Array("coefficient_groups", "every", 8, lasting=True)  # these coefficients
     coefficient_groups = Integer()  # of 8
     onto = Array()  # values -> coefficients
     back = Array()  # coefficients -> values at the stages
     metric = Array("rows")  # the diagonal of W
-    active = Array("invariants", kind=int)  # 0 for an invariant that follows from others
+    # 0 for an invariant that follows from others
+    active = Array("invariants", kind=int, lasting=True)
     on_manifold = Array("invariants", kind=int)  # 1 for an invariant of the solutions on a manifold only
     derived = Array("invariants", kind=int)  # 1 for an invariant that needs no check
     entries = Integer()  # of the gradients
@@ -55,11 +56,12 @@ class LineContext(Context):
     lower_row = Array("invariants")  # one of its rows, with the zeros
     pivots = Array("invariants")
     right = Array("invariants")
-    alpha = Array("invariants")
-    reference = Array("invariants")  # what the invariants are to be
-    owed = Array("invariants")  # what the step ahead is to take back of what rounding took from them
-    largest = Array("invariants")  # terms so far, of which rounding is a part
-    lost = Array("invariants")  # what was more than rounding, added up,
-    first_loss = Array("invariants")  # and the time when it was seen first
+    alpha = Array("invariants", lasting=True)
+    reference = Array("invariants", lasting=True)  # what the invariants are to be
+    # What the step ahead is to take back of what rounding took from them
+    owed = Array("invariants", lasting=True)
+    largest = Array("invariants", lasting=True)  # terms so far, of which rounding is a part
+    lost = Array("invariants", lasting=True)  # what was more than rounding, added up,
+    first_loss = Array("invariants", lasting=True)  # and the time when it was seen first
     culprit = Integer()  # the invariant that is none,
     change_rate = Real()  # and its rate of change beside the terms of that

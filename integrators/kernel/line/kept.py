@@ -23,11 +23,6 @@ from problems.graph.nodes import T
 from problems.problem import System
 from problems.systems.poisson import Poisson
 
-KEPT = (
-    "reference", "owed", "active", "gradients", "alpha", "legendre", "largest", "lost", "first_loss"
-)  # fmt: skip
-"""Arrays of a `LineContext` that the steps ahead depend on."""
-
 
 class Kept:
     """Several invariants of a system, or the energy of a Poisson system.
@@ -108,11 +103,6 @@ class Kept:
         for name in ("active", "owed", "metric", "on_manifold", "derived") if self.names else ():
             partial.point({name: getattr(own, name)})
         partial.point({"blocks.terms": own.blocks.terms})
-
-    @property
-    def arrays(self) -> tuple[str, ...]:
-        """What a checkpoint holds of it, by the names in `LineContext`."""
-        return KEPT if self.names else ()
 
     def report(self, context: Any) -> dict[str, Any]:
         """Return what `stats.extra` says of a trajectory."""

@@ -106,6 +106,8 @@ class Slot:
     name: str
     index: int
     """Which word it is of what declares it."""
+    lasting = False
+    """Whether what comes later depends on what it holds; see `Memory.lasting`."""
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
@@ -116,6 +118,9 @@ class Number(Slot, property):
 
     kind: Any
     """Of `ctypes`."""
+
+    def __init__(self, *, lasting: bool = False):
+        self.lasting = lasting
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
@@ -202,10 +207,12 @@ class Array(Slot):
         None: the array is `Memory.point`\ ed to.
     kind : {float, int}
         What it holds.
+    lasting : bool
+        Whether what comes later depends on that.
     """
 
-    def __init__(self, *shape: int | str, kind: type = float):
-        self.shape, self.dtype = shape, kind
+    def __init__(self, *shape: int | str, kind: type = float, lasting: bool = False):
+        self.shape, self.dtype, self.lasting = shape, kind, lasting
 
     @overload
     def __get__(self, memory: None, owner: type) -> Self: ...
@@ -369,6 +376,9 @@ class Memory(_Slots):
     word_of: ClassVar[dict[str, int]] = {}
     """The word of each slot, those of parts too."""
     _all: ClassVar[dict[str, Slot]] = {}
+    lasting_words: ClassVar[dict[str, int]] = {}
+    """The word of each slot that lasts and holds a number; see `lasting`."""
+    lasting_arrays: ClassVar[tuple[str, ...]] = ()
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
@@ -377,6 +387,9 @@ class Memory(_Slots):
             for name, slot in part.declared.slots.items():
                 cls._all[f"{part.name}.{name}"] = slot
                 cls.word_of[f"{part.name}.{name}"] = part.index + slot.index
+        lasting = {name: slot for name, slot in cls._all.items() if slot.lasting}
+        cls.lasting_arrays = tuple(name for name, slot in lasting.items() if isinstance(slot, Array))
+        cls.lasting_words = {name: cls.word_of[name] for name in lasting if name not in cls.lasting_arrays}
 
     def __init__(
         self, numbers: Mapping[str, float], arrays: Mapping[str, NDArray[Any]],
@@ -447,6 +460,18 @@ class Memory(_Slots):
         self._own, self._indices = other._own, other._indices
         self.words[self._indices] += self.address - other.address
         self.pointed.become(other.pointed)
+
+    def lasting(self) -> tuple[dict[str, int], dict[str, NDArray[Any]]]:
+        """Return copies of what later steps depend on, by the names of the slots: words, and arrays."""
+        words = {name: int(self.words[word]) for name, word in self.lasting_words.items()}
+        return words, {name: attrgetter(name)(self).copy() for name in self.lasting_arrays}
+
+    def go_on(self, words: Mapping[str, int], arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Hold what `lasting` returned."""
+        for name, word in words.items():
+            self.words[self.word_of[name]] = word
+        for name, array in arrays.items():
+            attrgetter(name)(self)[:] = array
 
     def content(self) -> "Content":
         """Return a copy of all that it holds, for `renew`."""

@@ -9,8 +9,8 @@ class Energy(Part):
     # What writes the gradient of the energy and then the energy itself, called like the field with
     # eight stages; 0: no projection
     code = Pointer()
-    start = Real()  # the energy of the start, which steps end with,
-    scale = Real()  # and the inverse of how much of it the components make there
+    start = Real(lasting=True)  # the energy of the start, which steps end with,
+    scale = Real(lasting=True)  # and the inverse of how much of it the components make there
     rows = Integer()  # of what it writes: one more than the state has; 0: no projection
     width = Integer()  # components of a block of the state
     state_indices = Array(kind=int)  # where the components of (q, p) or y are in the state

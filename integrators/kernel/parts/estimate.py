@@ -23,15 +23,17 @@ class Estimate(Part):
     slow_decay = Array("blocks.count")  # and the largest that does not fall off as a smooth field's do
     fastest = Array("blocks.count")  # scale in each group, as a velocity,
     steepest = Array("blocks.count")  # and slope
-    noise = Array("blocks.count")  # coefficients that rounding explains; see `step.rounding`
-    largest = Array("blocks.groups")  # the largest size, as a velocity, that a block of each group has had
+    noise = Array("blocks.count", lasting=True)  # coefficients that rounding explains; see `step.rounding`
+    # The largest size, as a velocity, that a block of each group has had
+    largest = Array("blocks.groups", lasting=True)
     line = Real()  # part of a step on which noise is measured; 0: it is not
     # 1: the field is a function that is called, and may have more noise than rounding makes in a formula.
     called = Integer()
-    noisy = Integer()  # 1: it has, and that is in `noise`; TOO_NOISY: more than the tolerance allows
-    troubles = Integer()  # steps that were rejected or shortened,
-    next_look = Integer()  # and how many of them there are when noise is looked for again
-    spacing = Real()  # of differences beside a component, relative, where that is noise
+    # 1: it has, and that is in `noise`; TOO_NOISY: more than the tolerance allows
+    noisy = Integer(lasting=True)
+    troubles = Integer(lasting=True)  # steps that were rejected or shortened,
+    next_look = Integer(lasting=True)  # and how many of them there are when noise is looked for again
+    spacing = Real(lasting=True)  # of differences beside a component, relative, where that is noise
     measured = Integer()  # 1: noise was measured in the step that was estimated
     evident_error = Real()  # the estimated errors, of what is more than rounding in any field
     evident_quadrature_error = Real()
@@ -39,9 +41,13 @@ class Estimate(Part):
     error_decay = Real()  # of coefficients from one degree to the next, where the error is allowed
     quadrature_error_decay = Real()  # the same where the quadrature error is
     absolute = Array("blocks.count")  # the absolute tolerance of blocks, divided by the relative one
-    expected = Array("blocks.count")  # the largest size that blocks will reach, as far as is known
-    rescaled = Integer()  # > 0: errors are relative to that where it is larger than a block's own size
-    borrowed = Integer()  # 1: by their own sizes alone the step that was estimated is not good enough
+    # The largest size that blocks will reach, as far as is known
+    expected = Array("blocks.count", lasting=True)
+    # > 0: errors are relative to that where it is larger than a block's own size
+    rescaled = Integer(lasting=True)
+    # 1: by their own sizes alone the step that was estimated is not good enough
+    borrowed = Integer(lasting=True)
     # 1: what blocks will reach can be asked for, by UNSCALED; -n: after n steps again; 0: never
-    asks = Integer()
-    constant_field = Integer()  # 1: the field has the same value at all nodes of the step that was estimated
+    asks = Integer(lasting=True)
+    # 1: the field has the same value at all nodes of the step that was estimated
+    constant_field = Integer(lasting=True)

@@ -13,9 +13,10 @@ class Events(Part):
     code = Pointer()  # int64(context, memory), which looks for events in each step; 0: none
     memory = Pointer()
     act = Integer()  # 1: some of these change the state; then steps end there
-    seen = Integer()  # 1: the solved step has been looked at
-    acting = Integer()  # what an event that ends the solved step asks for: CHANGE, BEGIN_ANEW; 0: none does
-    time = Real()  # when
-    length_before = Real()  # of the step before it was ended there
-    acted = Real()  # when such an event happened last; infinite: never
-    repeated = Integer()  # how many have happened at that time
+    seen = Integer(lasting=True)  # 1: the solved step has been looked at
+    # What an event that ends the solved step asks for: CHANGE, BEGIN_ANEW; 0: none does
+    acting = Integer(lasting=True)
+    time = Real(lasting=True)  # when
+    length_before = Real(lasting=True)  # of the step before it was ended there
+    acted = Real(lasting=True)  # when such an event happened last; infinite: never
+    repeated = Integer(lasting=True)  # how many have happened at that time

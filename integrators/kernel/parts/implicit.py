@@ -13,10 +13,10 @@ class Implicit(Part):
     strategy = Integer()  # FIXED_POINT, AUTO, ALWAYS_IMPLICIT
     code = Pointer()  # int64(context, memory, started); 0: not there yet
     memory = Pointer()
-    active = Integer()  # 1: it is at work
+    active = Integer(lasting=True)  # 1: it is at work
     wanted = Integer()  # it should be, and is not there: FOR_STEPS, or only FOR_VECTORS that follow
-    slow = Integer()  # steps in a row at which the fixed-point iteration was slow
-    held = Integer()  # steps for which the implicit solver stays at work when it takes over
-    left = Integer()  # steps of these that are left
+    slow = Integer(lasting=True)  # steps in a row at which the fixed-point iteration was slow
+    held = Integer(lasting=True)  # steps for which the implicit solver stays at work when it takes over
+    left = Integer(lasting=True)  # steps of these that are left
     target_corrections = Real()  # corrections of an adaptive step to aim at, at most
     increment = Array()  # what it has found that the step adds to q, p or to y

@@ -13,7 +13,7 @@ class Pace(Part):
     state = Array("rows", "lanes")
     values = Array(2, "lanes")
     times = Array("lanes")
-    epsilon = Real()  # negative backwards
-    log_density = Real()  # of the step ahead
-    previous_log_density = Real()
-    density_slope = Real()  # of the logarithm, in time, at the state
+    epsilon = Real(lasting=True)  # negative backwards
+    log_density = Real(lasting=True)  # of the step ahead
+    previous_log_density = Real(lasting=True)
+    density_slope = Real(lasting=True)  # of the logarithm, in time, at the state

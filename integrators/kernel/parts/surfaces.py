@@ -28,7 +28,7 @@ class Surfaces(Part):
     near = Real()  # length of the longest of them that crosses none, and
     far = Real()  # of the shortest that does
     distance = Real()  # from the surface to the end of the last one, in parts of it
-    row = Integer()  # of the distance that vanishes there; 0: unknown
-    length_wanted = Real()  # of the step ahead, before that
-    reached = Integer()  # 1: the step that is solved ends on a surface
-    on_surface = Integer()  # the present state is on one: AT_STEP_END, AT_ORIGIN; 0: it is not
+    row = Integer(lasting=True)  # of the distance that vanishes there; 0: unknown
+    length_wanted = Real(lasting=True)  # of the step ahead, before that
+    reached = Integer(lasting=True)  # 1: the step that is solved ends on a surface
+    on_surface = Integer(lasting=True)  # the present state is on one: AT_STEP_END, AT_ORIGIN; 0: it is not

@@ -1,6 +1,5 @@
 """Tangent vectors of one trajectory, as Python sees them."""
 
-from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -139,10 +138,7 @@ class Vectors:
 
     def save(self) -> tuple[Any, ...]:
         """Return copies of all that the continuation depends on."""
-        groups = tuple(
-            (group.own.words[_LASTING], tuple(array.copy() for array in _arrays(group.own)))
-            for group in self._groups
-        )
+        groups = tuple(group.own.lasting() for group in self._groups)
         solvers = tuple(solver.save() for solver in self.solvers)
         ahead = [array.copy() for array in self._step_ahead]
         return self.shape, self._parameters.copy(), ahead, groups, solvers
@@ -158,12 +154,9 @@ class Vectors:
         _, _, ahead, groups, solvers = saved
         for array, kept in zip(self._step_ahead, ahead, strict=False):
             array[:] = kept
-        for group, (words, arrays) in zip(self._groups, groups, strict=True):
-            own = group.own
-            own.words[_LASTING] = words
-            own.set_factors(own.h)
-            for array, kept in zip(_arrays(own), arrays, strict=True):
-                array[:] = kept
+        for group, lasting in zip(self._groups, groups, strict=True):
+            group.own.go_on(*lasting)
+            group.own.set_factors(group.own.h)
         for own, kept in zip(self.solvers, solvers, strict=bool(solvers)):
             own.restore(kept)
 
@@ -180,21 +173,3 @@ class Vectors:
         """Return the vectors at samples, shape (m, dim, n); forget them, and those between."""
         known, self._known = self._known, {}
         return np.array([known[t] for t in times.tolist()]).reshape(-1, *self.shape)
-
-
-# What goes from step to step.
-_LASTING = [
-    Context.word_of[name]
-    for name in (
-        "h",
-        "t0",
-        "time_low",
-        "n",
-        "length",
-        "older_length",
-        "blocks.age",
-        "solver.free",
-        "solver.rate",
-    )
-]
-_arrays = attrgetter("state", "error", "values", "older_values", "blocks.weights", "blocks.floored_weights")

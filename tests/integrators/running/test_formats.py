@@ -68,7 +68,7 @@ def test_a_checkpoint_of_steps_with_other_numbers_is_refused():
     problem = problems.load("kepler")
     stepper = Gauss(s=3, h=0.05).compile(problem.system).start(problem.y0, problem.par)
     kept = stepper.checkpoint()
-    object.__setattr__(kept, "words", kept.words[:-1])
+    kept.words.popitem()
     with pytest.raises(InputError, match="of another version of hbvm-bench"):
         stepper.restore(kept)
 
