@@ -7,7 +7,7 @@ PIP     = $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
 # Where the results of each study lie; pages are composed of them.
 RESULTS := speed/race speed/automatic speed/work-precision conservation/endure conservation/drift encounters general \
-  many/large many/ensemble paper/paper paper/sitnikov peers
+  general/constraints many/large many/ensemble paper/paper paper/sitnikov peers
 OWN := chaos random costs
 REPORTS ?= $(RESULTS)
 STUDIES ?= $(OWN)
