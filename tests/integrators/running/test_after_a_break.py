@@ -149,7 +149,7 @@ def test_two_threads_may_want_the_last_integrator():
     pytest.importorskip("heyoka")
     problem = problems.load("pendulum")
     program = Taylor(tol=1e-15).compile(problem.system)
-    program._spare = Emptied()
+    program._spare = {b"": Emptied()}
     found = []
     threads = [
         threading.Thread(target=lambda: found.append(program.start(problem.y0, problem.par, 0.0).t))
