@@ -4,7 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from problems.analysis.ranges import RANGES, Range
-from problems.analysis.sizes import ROUNDING, size_in_time
+from problems.analysis.roundoff import ROUNDING
+from problems.analysis.sizes import size_in_time
 from problems.derive.forward import Slopes
 from problems.evaluate.evaluator import Evaluator
 from problems.graph.fold import Copy

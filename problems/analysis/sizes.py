@@ -11,9 +11,6 @@ from problems.derive.function import Function, renewed, stacked
 from problems.graph.fold import Fold
 from problems.graph.nodes import STATE, Node, T
 
-ROUNDING = 2.0**-50
-"""Part of the sum of its absolute terms, the largest so far, by which rounding may change a value."""
-
 _known: WeakKeyDictionary[Function, Function] = WeakKeyDictionary()
 
 

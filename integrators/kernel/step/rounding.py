@@ -21,7 +21,7 @@ from integrators.kernel.step.fixed_point import evaluate
 from integrators.kernel.step.rule import STAGNATION
 from integrators.kernel.step.sample import place
 from integrators.kernel.step.stages import offset
-from problems.analysis.sizes import ROUNDING
+from problems.analysis.roundoff import ROUNDING
 
 # Times the measured noise that a coefficient may be. That is the largest of four coefficients, on the less
 # noisy of two lines: of normally distributed ones smaller than a tenth of their deviation in one measurement

@@ -10,7 +10,11 @@ from integrators.kernel.native import binary, field
 from integrators.kernel.native.engine import KERNEL, Engine
 
 ROOTS = {name: engine._module for name, engine in ENGINES.items()} | {"fields": field.BUILT_BY}
-BESIDE = {"integrators.running.watchdog", "problems.targets.called"}  # what they have is compiled too
+BESIDE = {
+    "integrators.running.watchdog",
+    "problems.analysis.roundoff",
+    "problems.targets.called",
+}  # what they have is compiled too
 
 
 def reached(module):
