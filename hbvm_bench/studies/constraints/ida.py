@@ -85,7 +85,7 @@ class Program(ProgramBase):
 
 
 class Stepper(StepperBase):
-    """A trajectory of IDA: its own steps, and its polynomial at times between them."""
+    """A trajectory of IDA: the steps that it chooses, and its polynomial at times between them."""
 
     samplings = ("partial",)
 
