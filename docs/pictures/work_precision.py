@@ -11,7 +11,7 @@ import matplotlib.pyplot as plt
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE.parent / "_ext"))
-from first_page import WIDE, frame  # noqa: E402 -- beside the extensions
+from first_page import by_width, frame  # noqa: E402 -- beside the extensions
 
 from hbvm_bench.summaries.points import number  # noqa: E402
 
@@ -30,7 +30,7 @@ ABOVE, BELOW = 1e-4, 1e-13  # position errors that are drawn
 def settings() -> dict[str, list[tuple[float, float]]]:
     """Return time in seconds and position error of all settings of each method, of the outer Solar System."""
     cases = frame("speed/race")
-    here = cases[cases.title.str.startswith("Outer") & (cases.processor == WIDE)]
+    here, _ = by_width(cases[cases.title.str.startswith("Outer")])
     found: dict[str, list[tuple[float, float]]] = {name: [] for name in LINES}
     for record in here.record:
         name = record.case.method.partition("(")[0]

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from integrators.kernel.step.rounding import UNIT
 from integrators.kernel.step.rule import FLOOR, SMALLEST
 from integrators.protocol import Array, Status
+from problems.analysis.roundoff import UNIT
 
 POINTS, FEWEST = 16, 4  # values on a line, and how many of their differences must not be 0
 # Of the state's size, the lengths of the lines: on the first there are sixteen thousand doubles, on the last

@@ -186,9 +186,9 @@ integrate(problems.load, M1)                                 | problem must be a
 integrate(P1, M1, times='abc')                               | times must be numbers, not 'abc'
 integrate(P1, M1, times=[0, nan])                            | times must be finite numbers
 integrate(P1, M1, times=[0, inf])                            | times must be finite numbers
-integrate(P1, M1, times=[0, 1, 1])                           | times must be strictly monotone and ahead of
+integrate(P1, M1, times=[0, 1, 1])                           | times must be strictly monotone; times[1]
 integrate(P1, M1, times=[1, 0])                              | times must be strictly monotone and ahead of
-integrate(P1, M1, times=[0, 1, .5])                          | times must be strictly monotone and ahead of
+integrate(P1, M1, times=[0, 1, .5])                          | times must be strictly monotone; times[1]
 integrate(P1, M1, times=[[0, 1]])                            | times must be a non-empty one-dimensional
 integrate(P1, M1, times=[[0], [1, 2]])                       | times must be numbers, not [[0], [1, 2]]
 integrate(P1, M1, times=[0, 1j])                             | times is complex, and must be real

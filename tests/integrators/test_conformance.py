@@ -84,7 +84,9 @@ class Broken(HBVM):
             stepper.advance = wrong
             if fault == "forgets":
                 stepper.restore = lambda checkpoint: restore(
-                    dataclasses.replace(checkpoint, arrays=tuple(a + 1e-12 for a in checkpoint.arrays))
+                    dataclasses.replace(
+                        checkpoint, arrays={name: a + 1e-12 for name, a in checkpoint.arrays.items()}
+                    )
                 )
             return stepper
 

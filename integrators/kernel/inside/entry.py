@@ -41,9 +41,9 @@ from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.parts.events import CHANGE
 from integrators.kernel.simd.lanes import two_sum
-from integrators.kernel.step.rounding import UNIT
 from integrators.kernel.step.sample import write
 from integrators.kernel.step.sums import time_of_step
+from problems.analysis.roundoff import UNIT
 
 DEEPEST = 8  # times that a step is halved where samples do not resolve a function
 ISOLATED = 16  # changes of sign in a part that is not resolved: a pole, a jump or a corner makes fewer

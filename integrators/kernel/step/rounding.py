@@ -21,7 +21,7 @@ from integrators.kernel.step.fixed_point import evaluate
 from integrators.kernel.step.rule import STAGNATION
 from integrators.kernel.step.sample import place
 from integrators.kernel.step.stages import offset
-from problems.analysis.roundoff import ROUNDING
+from problems.analysis.roundoff import ROUNDING, UNIT
 
 # Times the measured noise that a coefficient may be. That is the largest of four coefficients, on the less
 # noisy of two lines: of normally distributed ones smaller than a tenth of their deviation in one measurement
@@ -32,8 +32,6 @@ BEYOND_NOISE = 40.0
 EVIDENT = 10.0 * STAGNATION
 # Of a component: a line on which it moves by so little tells nothing of the field but noise.
 LEAST_WAY = 2.0**-46
-# Part of its size by which a component's stages are unlike those of any smooth line: they are rounded.
-UNIT = 2.0**-52
 GOLDEN = 0.618  # multiples of it, but for their integers, are in no order
 
 
