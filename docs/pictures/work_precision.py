@@ -66,7 +66,7 @@ def draw(path: Path) -> None:
         ax.set(
             xlabel="time for 12,000 years (s), one core, AVX-512",
             ylabel="position error, relative",
-            xlim=(8e-4, None),
+            xlim=(6e-4, None),
             ylim=(1e-13, 1e-4),
         )
         ax.grid(color="#e4e4e4", linewidth=0.6)

@@ -198,8 +198,8 @@ def document(stores: Store | Stores, study: Path | None = None) -> Document:
     return page_of(gather([stores] if isinstance(stores, Store) else stores, study))
 
 
-def page_of(results: Results) -> Document:
-    """Return the page on results; raises what `find` does."""
+def page_of(results: Results, parts: dict[str, Results] | None = None) -> Document:
+    """Return the page on results, and on others that it has by their names; raises what `find` does."""
     campaigns = [run.index.campaign for run in results.runs]
     single = len(campaigns) == 1 or (
         campaigns[0].page.by_processor and len({campaign.name for campaign in campaigns}) == 1
@@ -209,7 +209,7 @@ def page_of(results: Results) -> Document:
         "title": titles[0] if single else f"{len(titles)} runs together: {'; '.join(titles)}",
         "description": campaigns[0].description if single else "",
     }
-    return _made(page_file(results.study if single else None), {"": results}, values)
+    return _made(page_file(results.study if single else None), {"": results, **(parts or {})}, values)
 
 
 def page_in(place: Path) -> Document:
@@ -220,19 +220,19 @@ def page_in(place: Path) -> Document:
     problems.errors.InputError
         If there are none, and what `gather` and `find` raise.
     """
-    if (place / PACKED).is_file():
-        return document(Store(place / PACKED).runs(), beside(place))
     found = {path.parent.name: path for path in sorted(place.glob(f"*/{PACKED}"))}
+    parts = {name: gather(Store(path).runs(), place=f"{name}/") for name, path in found.items()}
+    if (place / PACKED).is_file():
+        return page_of(gather(Store(place / PACKED).runs(), beside(place)), parts)
     if not found or not (place / template.NAME).is_file():
         raise InputError(f"the folder {str(place)!r} has no results, or no {template.NAME}.")
-    parts = {name: gather(Store(path).runs(), place=f"{name}/") for name, path in found.items()}
     return _made(place / template.NAME, parts, {})
 
 
 def _made(path: Path, parts: dict[str, Results], values: dict[str, Any]) -> Document:
     def results(name: str | None = None) -> Results:
-        if name is None and len(parts) == 1:
-            return next(iter(parts.values()))
+        if name is None:
+            name = next(iter(parts)) if len(parts) == 1 else ""
         if name not in parts:
             raise unknown("results of the page", str(name), parts)
         return parts[name]

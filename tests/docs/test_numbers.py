@@ -103,7 +103,7 @@ README = " ".join((pages.ROOT / "README.md").read_text(encoding="utf-8").split()
 WIDE = first_page.by_width(first_page.raced("energy and position error"))[0].processor.iloc[0]
 LOOSE = ("speed", "by energy and position error", f"Outer | {WIDE} | 1e-08, 1e-05", "WHFast512")
 README_RATIOS = [
-    ("0.54 times the time of Gauss", [LOOSE]),
+    ("0.28 times the time of Gauss", [LOOSE]),
     (
         "heyoka is faster, by a factor of 2.6 to 3.8",
         [("general", "by position error", f"(DETEST C{i}) | 1e-12", "Taylor") for i in (1, 2, 3, 4)],
