@@ -102,7 +102,8 @@ def words(kind: str) -> str:
     """Return a `kind` of processor for readers: ``"Zen 5, 512-bit, restricted to AVX2"``."""
     name, *more = kind.split("-")
     said = {"avx2": "restricted to AVX2", "512bit": "512-bit", "256bit": "256-bit"}
-    return ", ".join([name.replace("znver", "Zen ").replace("rocketlake", "Rocket Lake"), *(said.get(word, word) for word in more)])
+    processor = name.replace("znver", "Zen ").replace("rocketlake", "Rocket Lake")
+    return ", ".join([processor, *(said.get(word, word) for word in more)])
 
 
 def sentences(described: Iterable[Mapping[str, str | int]]) -> list[str]:
