@@ -12,7 +12,6 @@ import msgspec
 
 from hbvm_bench.campaign.entries import (
     FILE_NAME,
-    Accuracy,
     Checks,
     Ensemble,
     EnsembleEntry,
@@ -132,21 +131,6 @@ class Campaign(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             for method in entry.methods
             for text in _settings(method, parse_spec(entry.problem).name, {}, self.quick)
         ]
-
-    def asked(self) -> dict[str, list[Accuracy]]:
-        """Return the errors that are asked for on each problem, by itself and by goals, by its text."""
-        return {
-            fill(entry.use, values): [
-                within
-                for within in (
-                    entry.within,
-                    *(goal.within for goal in self.goals if not goal.only or name_of(entry) in goal.only),
-                )
-                if within
-            ]
-            for entry in self.entries()
-            for values in chosen(entry)
-        }
 
     def _count(self) -> int:
         """Return how many cases there are, without making any."""

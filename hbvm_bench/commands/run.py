@@ -24,6 +24,7 @@ from hbvm_bench.run.executors import Pool
 from hbvm_bench.run.task import InterruptedRunError, Request, UnfinishedRunError, request_of
 from hbvm_bench.store.files import ensure_writable
 from hbvm_bench.store.store import Index, Store
+from hbvm_bench.summaries import standings
 from problems.errors import InputError
 
 UNFINISHED = 1
@@ -311,5 +312,7 @@ def _time(campaign: Campaign, cases: list[Resolved], store: Store, live: Live) -
     if old := timing_pass.outdated(cases, store, campaign.timing):
         live.say(f"the plan of the timing has changed: {old} cases are timed again")
     live.phase("timing, problem by problem", visits, 0)
-    timing_pass.time_cases(cases, store, campaign.timing, campaign.limits, live.visit, campaign.asked())
+    timing_pass.time_cases(
+        cases, store, campaign.timing, campaign.limits, live.visit, standings.asked(campaign)
+    )
     live.visited()

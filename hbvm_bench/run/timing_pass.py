@@ -9,10 +9,10 @@ from types import MappingProxyType
 from msgspec.structs import replace
 
 from hbvm_bench.campaign import own
-from hbvm_bench.campaign.file import Accuracy, Limits, TimingPlan
+from hbvm_bench.campaign.entries import Accuracy, Limits, TimingPlan
 from hbvm_bench.campaign.identity import Resolved
 from hbvm_bench.measure import machine, reading
-from hbvm_bench.measure.timing import shared
+from hbvm_bench.measure.timing import chooses, shared
 from hbvm_bench.run.task import NO_RESULT, Request, timed
 from hbvm_bench.store.records import Record, Timing
 from hbvm_bench.store.store import Store
@@ -46,7 +46,7 @@ def time_cases(
     tell : callable, optional
         Called before each visit with the first case.
     asked : mapping, optional
-        The errors that are asked for by problem; see `hbvm_bench.summaries.front`.
+        The errors that are asked for by problem, as cases have its text; see `hbvm_bench.summaries.front`.
 
     Raises
     ------
@@ -121,10 +121,15 @@ def _together(
         compile_seconds=limits.compile_seconds * len(on),
     )
     taken: dict[str, list[Timing]] = {case.id: [] for case, _ in on}
-    going = on
+    left: set[str] = set()  # what takes no part in further rounds
+    compares = False
     for place, numbers in enumerate(shared(plan.rounds, plan.compilations)):
+        if plan.front and place and not compares and not chooses(numbers[0]):
+            compares = True
+            left -= front.chosen([replace(row, timing=_joined(taken[row.id])) for _, row in on], asked)
+        going = [(case, record) for case, record in on if case.id not in left]
         if not going:
-            break
+            continue
         request = Request(
             rows=[replace(record, result=NO_RESULT, timing=None) for _, record in going],
             limits=together,
@@ -138,11 +143,9 @@ def _together(
         for (case, _), part in zip(going, parts, strict=True):
             taken[case.id].append(part)
         if plan.front and not place:
-            left = front.behind([record for _, record in on], parts, asked)
-            for (case, _), is_behind in zip(on, left, strict=True):
-                if is_behind:
-                    taken[case.id].append(Timing(why=front.WHY))
-            going = [item for item, is_behind in zip(on, left, strict=True) if not is_behind]
+            left = front.behind([record for _, record in on], parts)
+    for key in left:
+        taken[key].append(Timing(why=front.WHY))
     return [_joined(taken[case.id]) if case.id in taken else Timing(why=OFF) for case, _ in group]
 
 

@@ -7,9 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from statistics import median
 
-from hbvm_bench.campaign.file import Campaign, ProblemEntry, name_of
+from hbvm_bench.campaign.entries import Accuracy
+from hbvm_bench.campaign.file import Campaign, ProblemEntry, chosen, name_of
 from hbvm_bench.campaign.identity import make_problem
-from hbvm_bench.campaign.sweep import combinations, fill
+from hbvm_bench.campaign.sweep import fill
 from hbvm_bench.measure.timing import Spread, chooses
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries.points import accurate, family_of, is_hbvm_or_gauss, number
@@ -33,14 +34,34 @@ def entries(campaign: Campaign, records: Sequence[Record]) -> list[tuple[Problem
     result: list[tuple[ProblemEntry, list[Record]]] = []
     tables = tasks(records)
     for entry in campaign.entries():
-        for chosen in combinations(entry.sweep):
-            problem = make_problem(fill(entry.use, entry.values | chosen))
+        for values in chosen(entry):
+            problem = make_problem(fill(entry.use, values))
             grid = campaign.grid if entry.grid is None else entry.grid
             result.append((entry, tables.get(Task.on(repr(problem), grid), [])))
     for many in campaign.ensembles:
         task = Task.on(repr(make_problem(many.problem)), ensemble=many.ensemble)
         result.append((many.entry, tables.get(task, [])))
     return result
+
+
+def asked(campaign: Campaign) -> dict[str, list[Accuracy]]:
+    """Return the errors that a campaign asks for, by itself and by goals, by the problem as it prints."""
+    return {
+        repr(make_problem(fill(entry.use, values))): [
+            within
+            for within in (
+                entry.within,
+                *(
+                    goal.within
+                    for goal in campaign.goals
+                    if name_of(entry) in (goal.only or [name_of(entry)])
+                ),
+            )
+            if within
+        ]
+        for entry in campaign.entries()
+        for values in chosen(entry)
+    }
 
 
 def title_of(entry: ProblemEntry) -> str:
@@ -58,18 +79,23 @@ def among(records: Sequence[Record], who: str) -> list[Record]:
 def best(records: Sequence[Record], within: Mapping[str, float], metric: str = TIME) -> Record | None:
     """Return the case that takes least of those that are accurate enough; ``None`` if there is none.
 
-    Times are those of the rounds that choose.
+    Times are those of the rounds that choose, see `choosing`.
     """
     able = [
         setting for setting in records if accurate(setting, within) and number(setting, metric) is not None
     ]
 
     def least(record: Record) -> float:
-        rounds = by_round(record) if metric == TIME else {}
-        choosing = [seconds for number, seconds in rounds.items() if chooses(number)] or rounds.values()
-        return median(choosing) if choosing else number(record, metric) or 0.0
+        seconds = choosing(record) if metric == TIME else None
+        return seconds or number(record, metric) or 0.0
 
     return min(able, key=least, default=None)
+
+
+def choosing(record: Record) -> float | None:
+    """Return the median seconds of the rounds that choose; of all where none does, ``None`` without any."""
+    rounds = by_round(record)
+    return median([rounds[key] for key in rounds if chooses(key)] or rounds.values()) if rounds else None
 
 
 def compare(

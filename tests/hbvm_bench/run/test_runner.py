@@ -236,6 +236,19 @@ def test_compilations_share_the_rounds_and_are_processes_of_their_own(toys, stor
     assert timing_pass.outdated(cases, store, PLAN) == 2
 
 
+def test_a_slow_setting_that_is_chosen_is_compared_in_rounds_that_did_not_choose_it(toys, store, monkeypatch):
+    """Both are far behind a third and timed once; that which the errors asked for choose is timed again."""
+    plan = msgspec.structs.replace(PLAN, rounds=6, compilations=3, front=True)
+    cases = [resolve(case(f"Steady(h={h})")) for h in (0.1, 0.2, 0.4)]
+    for one in cases:
+        run_case(one.case, str(store.directory), GENEROUS)
+    monkeypatch.setattr(timing_pass.front, "behind", lambda records, timings: {one.id for one in cases[:2]})
+    monkeypatch.setattr(timing_pass.front, "chosen", lambda records, asked: {cases[1].id, cases[2].id})
+    timing_pass.time_cases(cases, store, plan, GENEROUS)
+    numbers = [[round_.number for round_ in store.load(one.id).timing.rounds] for one in cases]
+    assert numbers == [[0, 4], [0, 1, 2, 4, 5], [0, 1, 2, 3, 4, 5]]
+
+
 @pytest.mark.slow  # our kernel is compiled twice from nothing
 def test_each_compilation_begins_with_empty_caches(store):
     plan = TimingPlan(rounds=2, shortest=1e-6, compilations=2)

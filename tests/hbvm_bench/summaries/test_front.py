@@ -1,8 +1,11 @@
 """Which settings are timed again after the first compilation."""
 
-from hbvm_bench.campaign.file import Case
-from hbvm_bench.campaign.identity import resolve
-from hbvm_bench.summaries.front import behind
+import pytest
+
+from hbvm_bench.campaign.file import Case, load
+from hbvm_bench.campaign.identity import make_problem, resolve
+from hbvm_bench.summaries import standings
+from hbvm_bench.summaries.front import behind, chosen
 from tests.hbvm_bench import made_up_run
 
 SETTINGS = [
@@ -18,19 +21,33 @@ SETTINGS = [
 ]
 
 
-def found(asked):
+def records():
     cases = [resolve(Case(problem="kepler", method=method)) for method, _, _ in SETTINGS]
-    records = [
+    return [
         made_up_run.record(case, [seconds] if seconds else [], metrics={"energy_max": e, "position_end": e})
         for case, (_, seconds, e) in zip(cases, SETTINGS, strict=True)
     ]
-    return behind(records, [record.timing or made_up_run.Timing() for record in records], asked)
 
 
 def test_a_setting_far_from_the_fastest_at_every_error_that_it_reaches_is_not_timed_again():
-    assert found([]) == [False, True, False, False, True, True, True, True, False]
+    there = records()
+    found = behind(there, [record.timing or made_up_run.Timing() for record in there])
+    assert [record.id in found for record in there] == [
+        *(False, True, False, False, True, True, True, True, False)
+    ]
 
 
-def test_at_the_errors_asked_for_the_fastest_of_each_method_is_timed_again():
-    asked = [{"energy_max": 1e-11, "position_end": 1e-10}]
-    assert found(asked) == [False, True, False, False, False, True, False, True, False]
+def test_at_the_errors_asked_for_each_method_has_a_setting_that_is_compared():
+    there = records()
+    found = chosen(there, [{"energy_max": 1e-11, "position_end": 1e-10}])
+    assert [record.case.method for record in there if record.id in found] == [
+        *("Gauss(s=8, h=0.1)", "Taylor(tol=1e-15)", "IAS15(epsilon=1e-10)")
+    ]
+
+
+@pytest.mark.parametrize("study", ["race", "large", "encounters"])
+def test_the_errors_asked_for_are_found_by_the_problem_as_cases_print_it(study):
+    """A campaign writes ``fput(n=32)``, its cases ``fput(n=32, alpha=0.25, ...)``."""
+    campaign = load(study)
+    printed = {repr(make_problem(case.problem)) for case in campaign.cases()}
+    assert printed <= {*standings.asked(campaign)}
