@@ -43,6 +43,10 @@ from problems.errors import InputError
 from problems.problem import Problem, System
 
 
+SEARCHES = 8
+"""For events, that are kept at most; see `HBVMProgram.with_events`."""
+
+
 class HBVMProgram(Compiled):
     """HBVM(k, s), compiled for one system; satisfies `integrators.protocol.Program`.
 
@@ -112,6 +116,7 @@ class HBVMProgram(Compiled):
         parts = [self.field, kernel, self.fused, *(self.kept.code if self.kept else ())]
         parts += self.adaptive.code if self.adaptive else []
         self.from_cache = all(part.from_cache for part in parts if part is not None)
+        self._searches: dict[tuple[tuple[str, int], ...], WithEvents] = {}  # they hold the events
         self._workspace: Workspace | None = None
         self._in_lanes: tuple[Lanes | None] | None = None
         self._along: dict[tuple[int, bool], VectorLanes | None] = {}
@@ -182,14 +187,17 @@ class HBVMProgram(Compiled):
     def with_events(self, problem: Problem, events: Mapping[str, Event]) -> WithEvents:
         """Compile the functions of events; return what starts a trajectory that looks for them.
 
-        Its arguments are those of `start`, and the time up to which is looked.
+        Its arguments are those of `start`, and the time up to which is looked. The last ones are kept, for
+        the same events; not those that Python is called for, which know what they have raised.
 
         Raises
         ------
         problems.errors.InputError
             If a function can neither be traced nor called with numbers.
         """
-        started = binary.clock()
+        started, key = binary.clock(), tuple((name, id(event)) for name, event in events.items())
+        if (kept := self._searches.get(key)) is not None:
+            return kept
         functions = [EventFunction(name, event.g, problem) for name, event in events.items()]
         actions = {
             name: Action(name, event.then, problem)
@@ -198,7 +206,12 @@ class HBVMProgram(Compiled):
         }
         look.code()
         self.compile_seconds += binary.clock() - started
-        return WithEvents(self, events, functions, actions)
+        search = WithEvents(self, events, functions, actions)
+        if not any(function.calls_back for function in (*functions, *actions.values())):
+            if len(self._searches) >= SEARCHES:
+                self._searches.pop(next(iter(self._searches)), None)
+            self._searches[key] = search
+        return search
 
     def batch(
         self,
