@@ -64,7 +64,7 @@ class BatchProgram(Protocol):
 
     def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> HBVMStepper: ...
     def in_lanes(self) -> Lanes | None: ...
-    def contexts(self) -> tuple[Context, Context]: ...
+    def contexts(self, par: Array) -> tuple[Context, Context]: ...
 
 
 def prepare_batch(
@@ -292,7 +292,8 @@ class Adaptive(_InLanes):
 
     def contexts(self) -> list[tuple[Context, ...]]:
         """Return fresh contexts for each lane: that of its trajectory first."""
-        return [self.work.program.contexts()[:1] for _ in range(self.lanes.width)]
+        par = self.work.parameters[0]
+        return [self.work.program.contexts(par)[:1] for _ in range(self.lanes.width)]
 
     def memory(self) -> Any:
         contexts, adaptive = self.contexts(), self.work.program.adaptive

@@ -150,7 +150,8 @@ class _Watched(Adaptive):
         return h, counts | events, arrays | {"stops": np.full(len(work.starts), np.nan)}
 
     def contexts(self) -> list[tuple[Context, ...]]:
-        return [self.work.program.contexts() for _ in range(self.lanes.width)]
+        par = self.work.parameters[0]
+        return [self.work.program.contexts(par) for _ in range(self.lanes.width)]
 
     def memory(self) -> Any:
         search, width, dim = self.work.search, self.lanes.width, self.lanes.dim

@@ -27,7 +27,6 @@ from integrators.kernel.parts.implicit import ALWAYS_IMPLICIT
 from integrators.kernel.plan import Plan
 from integrators.kernel.reversible import Reversible
 from integrators.kernel.simd.emit import WIDTH
-from integrators.kernel.spare import Pair, Spare
 from integrators.kernel.step.rule import (
     LOG_RESIDUAL,
     STAGNATION,
@@ -97,9 +96,9 @@ class HBVMProgram(Compiled):
             rows = system.dof
             block = block[:rows]
             group = group[: block[-1] + 1]
-        nothing = np.empty(0)
-        self._known_velocity = b"?", (nothing, nothing, nothing)
-        unit = tables.unit(self.constants, self._velocity_scale(np.full(system.n_par, np.nan)))
+        anywhere = self._velocity_scale(np.full(system.n_par, np.nan))
+        self._velocity_is_fixed = bool(np.isfinite(anywhere).all())  # whatever the parameters
+        unit = tables.unit(self.constants, anywhere)
         self.fused = self._iterations(quantity, rows, lanes) if unit and not self.kept else None
         self.shape = Shape(
             rows, self.second, unit, self.field, self.fused,
@@ -109,8 +108,7 @@ class HBVMProgram(Compiled):
         if self.varying and self.constants.route != tables.THROUGH:
             self._fixed["raw_matrix"] = tables.rounded(self.constants)
         self.adaptive = self._adaptive()
-        self._fresh: dict[bool, Context] = {}
-        self.spare = Spare()
+        self._fresh: tuple[bytes, Context, Context] | None = None
         self.vectors: dict[tuple[int, bool], Context] = {}
         """Contexts of tangent vectors, by their number and whether they move parameters, to be copied."""
         parts = [self.field, kernel, self.fused, *(self.kept.code if self.kept else ())]
@@ -320,12 +318,6 @@ class HBVMProgram(Compiled):
             return None, 0.0
         return compiled_lanes(lambda: VectorLanes(self.system, constants, unit, count, moves))
 
-    @property
-    def _velocity_is_fixed(self) -> bool:
-        """Whether velocities by momenta do not depend on parameters."""
-        anywhere = self._velocity_scale(np.full(self.system.n_par, np.nan))
-        return bool(np.isfinite(anywhere).all())
-
     def goes_along(self, directions: tuple[Array, Array]) -> bool:
         """Whether `batch_along` has lanes for such vectors; compiled the first time."""
         return self.in_lanes_along(*_vectors_of(directions)) is not None
@@ -353,84 +345,62 @@ class HBVMProgram(Compiled):
         """Return the tables for steps of h, which may be negative."""
         return tables.scaled(self.constants, h, squared=self.second and self.shape.unit)
 
-    def contexts(self) -> tuple[Context, Context]:
-        """Return fresh memory for a trajectory, and for its partial steps."""
-        own, partial = self._fresh_one(partial=False).copy(), self._fresh_one(partial=True).copy()
+    def contexts(self, par: Array) -> tuple[Context, Context]:
+        """Return fresh memory for a trajectory with these parameters, and for its partial steps."""
+        key, fresh = par.tobytes(), self._fresh  # read once: another thread may replace it
+        if fresh is None or fresh[0] != key:
+            own, partial = (
+                (self._new_context(partial=False), self._new_context(partial=True))
+                if fresh is None
+                else (fresh[1].copy(), fresh[2].copy())
+            )
+            self.renew(own, partial, par)
+            self._fresh = fresh = key, own, partial
+        own, partial = fresh[1].copy(), fresh[2].copy()
         if self.kept:
             self.kept.share(own, partial)
         return own, partial
 
-    def _fresh_one(self, *, partial: bool) -> Context:
-        """Return fresh memory to copy, made the first time."""
-        if partial not in self._fresh:
-            tables = {**self._fixed, **({} if partial or self.varying else self.scaled(self.h))}
-            more = self.adaptive.more if self.adaptive else {}
-            kept = self.kept
-            context = kept.context(self.shape, tables) if kept else Context(self.shape, tables, more)
-            context.solver.tolerance, context.solver.stagnation = TOLERANCE, STAGNATION
-            context.solver.log_residual = LOG_RESIDUAL
-            if self.adaptive:
-                self.adaptive.set(context)
-            if not partial:
-                context.h, context.implicit.strategy = self.h, self.solver.strategy
-                context.controller.next_length = (self.plan.h or 0.0) if self.varying else 0.0
-            self._fresh[partial] = context  # when it is complete: another thread may copy it at once
-        return self._fresh[partial]
-
-    def pair(self, par: Array) -> Pair:
-        """Return memory for a trajectory with these parameters, fresh or that of one that is over."""
-        pair = self.spare.take()
-        if pair is None:
-            pair = Pair(*self.contexts())
-            self.renew(pair.own, pair.partial, par)
-            return pair
-        if not pair.renew():
-            pair.own.become(self._fresh_one(partial=False))
-            pair.partial.become(self._fresh_one(partial=True))
-            if self.kept:
-                self.kept.share(pair.own, pair.partial)
-        if pair.par != (key := par.tobytes()):
-            self.renew(pair.own, pair.partial, par)
-            pair.keep(key)
-        return pair
+    def _new_context(self, *, partial: bool) -> Context:
+        """Return fresh memory, without parameters."""
+        tables = {**self._fixed, **({} if partial or self.varying else self.scaled(self.h))}
+        more = self.adaptive.more if self.adaptive else {}
+        kept = self.kept
+        context = kept.context(self.shape, tables) if kept else Context(self.shape, tables, more)
+        context.solver.tolerance, context.solver.stagnation = TOLERANCE, STAGNATION
+        context.solver.log_residual = LOG_RESIDUAL
+        if self.adaptive:
+            self.adaptive.set(context)
+        if not partial:
+            context.h, context.implicit.strategy = self.h, self.solver.strategy
+            context.controller.next_length = (self.plan.h or 0.0) if self.varying else 0.0
+        return context
 
     def renew(self, own: Context, partial: Context, par: Array) -> None:
         """Put parameters and the velocities by momentum that they make into the memory of a trajectory."""
         for context in (own, partial):
             context.par[:] = par
         if self.second:
-            velocity, speed, mass = self._velocity(par)
+            velocity, speed = self._velocity_scale(par), np.ones(self.shape.group.size)
+            speed[self.shape.block] = np.where(velocity == 0.0, 1.0, np.abs(velocity))
             for context in (own, partial):
-                (
-                    context.factors.velocity[: self.shape.rows],
-                    context.blocks.speed[:],
-                    context.blocks.mass[:],
-                ) = velocity, speed, mass
+                context.factors.velocity[: self.shape.rows] = velocity
+                context.blocks.speed[:], context.blocks.mass[:] = speed, 1.0 / speed
         if self.adaptive:
             self.adaptive.renew(own, par)
 
-    def begin(self, pair: Pair, y: Array, par: Array, t0: float) -> None:
+    def begin(self, own: Context, partial: Context, y: Array, par: Array, t0: float) -> None:
         """Put what a trajectory from (t0, y) begins with besides into its memory."""
         if self.kept:
-            self.kept.load((pair.own, pair.partial), y, par, t0)
+            self.kept.load((own, partial), y, par, t0)
         if self.adaptive:
-            self.adaptive.begin(pair.own, y, par, t0)
+            self.adaptive.begin(own, y, par, t0)
 
     def _velocity_scale(self, par: Array) -> Array:
         """Q' = velocity * p, of unit momenta; shape (dof,), empty in first-order form."""
         if not self.second:
             return np.ones(0)
         return targets.numpy(self.system, "velocity_scale")(0.0, np.zeros(self.system.dim), par)
-
-    def _velocity(self, par: Array) -> tuple[Array, Array, Array]:
-        """Return `_velocity_scale`, and `Blocks.speed` and `Blocks.mass` of blocks."""
-        key = par.tobytes()
-        known, velocities = self._known_velocity  # read once: another thread may replace it
-        if known != key:
-            velocity, speed = self._velocity_scale(par), np.ones(self.shape.group.size)
-            speed[self.shape.block] = np.where(velocity == 0.0, 1.0, np.abs(velocity))
-            self._known_velocity = key, velocities = key, (velocity, speed, 1.0 / speed)
-        return velocities
 
 
 def _vectors_of(directions: tuple[Array, Array]) -> tuple[int, bool]:

@@ -33,6 +33,7 @@ from integrators.kernel.context import (
 from integrators.kernel.engines import solver, steps
 from integrators.kernel.implicit.workspace import Solver, Workspace, report
 from integrators.kernel.inside.functions import Action, EventFunction
+from integrators.kernel.inside.search import KernelSearch
 from integrators.kernel.line.kept import Kept
 from integrators.kernel.native import binary
 from integrators.kernel.native.memory import address
@@ -40,8 +41,6 @@ from integrators.kernel.noise import ALL_LENGTHS, Noise, field_noise
 from integrators.kernel.pace import FEWEST, Pace
 from integrators.kernel.parts.implicit import ALWAYS_IMPLICIT, AUTO, FOR_VECTORS, NOT_WANTED
 from integrators.kernel.plan import Plan
-from integrators.kernel.searches import LastingSearch
-from integrators.kernel.spare import Pair, Spare
 from integrators.kernel.step.rule import STAGNATION
 from integrators.kernel.tables import Constants
 from integrators.kernel.tangent.frames import Frames
@@ -100,10 +99,8 @@ class Program(Protocol):
 
     vectors: dict[tuple[int, bool], Context]
 
-    spare: Spare
-
-    def pair(self, par: Array) -> Pair: ...
-    def begin(self, pair: Pair, y: Array, par: Array, t0: float) -> None: ...
+    def contexts(self, par: Array) -> tuple[Context, Context]: ...
+    def begin(self, own: Context, partial: Context, y: Array, par: Array, t0: float) -> None: ...
     def renew(self, own: Context, partial: Context, par: Array) -> None: ...
     def scaled(self, h: float) -> dict[str, Array]: ...
     def implicit(self) -> Workspace: ...
@@ -147,7 +144,7 @@ class HBVMStepper(ABC):
 
     error: Exception | None = None
     """What a function of the user raised, where the status is ``USER_ERROR``."""
-    search: LastingSearch | None = None
+    search: KernelSearch | None = None
     """What looks for events in the steps, see `look_for`."""
     samplings: tuple[str, ...] = SAMPLINGS
     destination: float | None = None
@@ -158,7 +155,6 @@ class HBVMStepper(ABC):
     variations: Array | None = None
     """Tangent vectors at the last samples, shape (m, dim, n); see `follow`."""
     _vectors: Vectors | None = None
-    _pair: Pair | None = None
     _recorded = False  # whether steps are recorded for an adjoint
     stop: threading.Event | None = None  # set by another thread: come back, what is made is not wanted
 
@@ -170,30 +166,20 @@ class HBVMStepper(ABC):
         if isinstance(program.system, Opaque):
             program.system.forget_undefined()
         self._status, self._reason = Status.RUNNING, ""
-        self._pair, self._par = program.pair(par), par
-        pair = self._pair
-        self._context, self._partial = pair.own, pair.partial
-        program.begin(pair, y, par, t0)
+        self._par = par
+        self._context, self._partial = program.contexts(par)
+        program.begin(self._context, self._partial, y, par, t0)
         if program.solver.strategy == ALWAYS_IMPLICIT:
             self._take_implicit()
         self._begin(y, t0)
-
-    def __del__(self) -> None:
-        # A search for events and records know the memory too, and may be there longer.
-        if self._pair is None or self._recorded:
-            return
-        if self.search is None:
-            self._program.spare.give(self._pair)
-        else:
-            self.search.give_when_over(self._program.spare, self._pair)
 
     def look_for(
         self, events: Mapping[str, Event], functions: Sequence[EventFunction], actions: Mapping[str, Action],
         end: float,
     ) -> None:  # fmt: skip
         """Look for events in all steps from here on, up to a time."""
-        assert self._pair is not None
-        self.search = LastingSearch(events, functions, actions, self._pair, end)
+        contexts = self._context, self._partial
+        self.search = KernelSearch(events, functions, actions, contexts, end)
         self._pace = Pace(CHUNK_WITH_EVENTS, self._dim)
         self._pace.steps = FEWEST
 
@@ -204,14 +190,9 @@ class HBVMStepper(ABC):
         if self._vectors and self._vectors.fits(directions):
             self._vectors.put(directions.state)
             return
-        assert self._pair is not None
-        self._vectors = self._pair.kept_vectors(directions)
-        if self._vectors is None:
-            system, program, started = self._program.system, self._program, binary.clock()
-            self._vectors = Vectors(system, (self._context, self._partial), directions, program.vectors)
-            self._pair.keep_vectors(self._vectors)
-            program.compile_seconds += binary.clock() - started
-        self._vectors.begin(directions)
+        system, program, started = self._program.system, self._program, binary.clock()
+        self._vectors = Vectors(system, (self._context, self._partial), directions, program.vectors)
+        program.compile_seconds += binary.clock() - started
         if self._implicit is not None:
             self._vectors.solve_by(self._implicit)
 
@@ -300,10 +281,8 @@ class HBVMStepper(ABC):
 
     def _renew(self, par: Array) -> None:
         """Let other parameters be the present ones."""
-        assert self._pair is not None
         if np.array_equal(par, self._context.par):
             return
-        self._pair.forget()
         self._program.renew(self._context, self._partial, par)
         for workspace in self._implicit or ():
             workspace.forget()

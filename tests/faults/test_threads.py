@@ -11,7 +11,6 @@ import pytest
 
 import problems
 from integrators import HBVM, LineIntegral, registry
-from integrators.kernel import program
 from integrators.kernel.native import engine, foreign
 from integrators.protocol import Status
 from tests.faults.fault import Fault, is_met
@@ -27,36 +26,22 @@ def in_thread(do):
 
 
 def test_parameters_of_another_thread_are_not_taken_for_its_own():
-    """Just when the velocities of one thread are known, another thread asks for those of other masses."""
+    """Just when the memory of one thread is known, another thread asks for that of other masses."""
     problem = problems.load("outer_solar_system")
     made = HBVM(k=4, s=2, h=1.0).compile(problem.system)
-    heavy, light = problem.par * 3.0, problem.par * 7.0
-    expected, others = made._velocity(heavy), []
+    heavy, light, others = problem.par * 3.0, problem.par * 7.0, []
+    _, *contexts = made.contexts(heavy) and made._fresh
 
     class Key(bytes):
         def __ne__(self, other):
             if not others:
                 others.append(light)
-                in_thread(lambda: made._velocity(light))
+                in_thread(lambda: made.contexts(light))
             return bytes.__ne__(self, other)
 
-    made._known_velocity = (Key(heavy.tobytes()), expected)
-    assert all(map(np.array_equal, made._velocity(heavy), expected))
+    made._fresh = (Key(heavy.tobytes()), *contexts)
+    assert all(np.array_equal(context.par, heavy) for context in made.contexts(heavy))
     assert others == [light], "the other thread never came between"
-
-
-def test_memory_is_there_for_other_threads_only_when_it_is_complete():
-    made = HBVM(k=4, s=2, h=0.1).compile(KEPLER.system)
-    seen = []
-
-    class Watched(dict):
-        def __setitem__(self, key, value):
-            seen.append(value.solver.tolerance)
-            super().__setitem__(key, value)
-
-    made._fresh = Watched()
-    made.contexts()
-    assert seen == [program.TOLERANCE] * 2
 
 
 def test_an_error_of_a_function_stays_in_its_thread(monkeypatch):

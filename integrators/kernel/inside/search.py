@@ -35,7 +35,6 @@ from integrators.protocol import Array, Status, UserError
 LOW = 4  # below this degree of the method's polynomial one term more is looked for; see `series`
 LEAST, MOST = 8, 16  # samples in a step to begin with; more where these do not show the function
 HITS, NUMBERS = 1024, 1 << 17  # occurrences, and components of their states, that are kept until Python asks
-FRESH = ("happened", "due", "due_directions")  # all else is set at the start, or before it is read
 LASTING = ("ends", "touched", "finite", "happened", "recent", "due", "due_directions", "action_state")
 
 
@@ -142,8 +141,6 @@ class KernelSearch:
         Of the trajectory, and for partial steps; the solver of steps need not be there.
     end : float
         The time up to which is looked.
-    memory : Search, optional
-        That of a search for the same with these contexts, which is over.
 
     Raises
     ------
@@ -153,17 +150,13 @@ class KernelSearch:
 
     def __init__(
         self, events: Mapping[str, Event], functions: Sequence[EventFunction], actions: Mapping[str, Action],
-        contexts: tuple[Context, Context], end: float, memory: Search | None = None,
+        contexts: tuple[Context, Context], end: float,
     ):  # fmt: skip
         self._functions, self._actions = functions, actions
         self._context, _ = contexts
         self._dim, sign = self._context.shape.dim, 1.0 if end >= self._context.t0 else -1.0
-        memory = search_memory(events, functions, actions, contexts) if memory is None else memory
-        self._memory = memory
+        self._memory = memory = search_memory(events, functions, actions, contexts)
         memory.last, memory.sign = end, sign
-        memory.hits = memory.evaluations = memory.iterations = memory.partial_steps = 0
-        for name in FRESH:
-            getattr(memory, name)[:] = 0
         self._hits = EventLog(events, memory.sign, self._dim, memory.parameters)
         self._make_room(room_for(max(self._dim, memory.parameters)))
         self.trouble: tuple[Status, str, Exception | None] | None = None

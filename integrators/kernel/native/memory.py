@@ -37,8 +37,6 @@ from numpy.typing import NDArray
 Numbers = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-Content = tuple[Numbers, dict[int, Any]]
-
 LINE = 8  # words in 64 bytes, at a multiple of which every array begins
 
 
@@ -78,26 +76,20 @@ def address_of(owner: "Addressed | NDArray[Any] | None") -> int:
 class Pointed(dict[int, Any]):
     """What a memory points to, by the word that holds its address: it lives as long as the memory."""
 
-    changed = True
-    """Whether the memory points elsewhere than when `Memory.content` was called."""
     calls_back = False
     """Whether any of it calls Python back; it is complete when it is pointed to."""
 
     def hold(self, word: int, owner: Any) -> None:
         """Keep what a word holds the address of, instead of what was there before."""
-        before, self[word], self.changed = self.get(word), owner, True
+        before, self[word] = self.get(word), owner
         if self.calls_back or getattr(owner, "calls_back", False) or getattr(before, "calls_back", False):
-            self._find_callers()
+            self.calls_back = any(getattr(each, "calls_back", False) for each in self.values())
 
-    def become(self, other: Mapping[int, Any]) -> None:
-        """Hold what another holds."""
-        self.clear()
-        self.update(other)
-        self.changed = True
-        self._find_callers()
-
-    def _find_callers(self) -> None:
-        self.calls_back = any(getattr(owner, "calls_back", False) for owner in self.values())
+    def copy(self) -> "Pointed":
+        """Hold what this holds."""
+        other = Pointed(self)
+        other.calls_back = self.calls_back
+        return other
 
 
 class Slot:
@@ -147,7 +139,7 @@ class Integer(Number):
         def __set__(self, memory: "_Slots", value: int) -> None: ...
 
     def _write(self, memory: "_Slots", value: float) -> None:
-        memory.words[self.index] = value
+        setattr(memory.numbers, self.name, int(value))
 
 
 class Real(Number):
@@ -167,7 +159,7 @@ class Real(Number):
         def __set__(self, memory: "_Slots", value: float) -> None: ...
 
     def _write(self, memory: "_Slots", value: float) -> None:
-        memory.reals[self.index] = value
+        setattr(memory.numbers, self.name, value)
 
 
 class Pointer(Integer):
@@ -183,7 +175,7 @@ class Pointer(Integer):
         ) -> None: ...
 
     def _write(self, memory: "_Slots", value: Any) -> None:
-        memory.words[self.index] = address_of(value)
+        setattr(memory.numbers, self.name, address_of(value))
         memory.pointed.hold(memory._first + self.index, value)
 
 
@@ -191,7 +183,7 @@ class Backward(Pointer):
     """The address of the memory that holds this one and outlives it: to hold it too would make a circle."""
 
     def _write(self, memory: "_Slots", value: Any) -> None:
-        memory.words[self.index] = value.address
+        setattr(memory.numbers, self.name, value.address)
         memory.pointed.hold(memory._first + self.index, ref(value))
 
 
@@ -224,7 +216,7 @@ class Array(Slot):
         if (pointed := memory.pointed.get(memory._first + self.index)) is not None:
             return pointed
         # Compiled code may have exchanged it for another.
-        start = memory._first + (int(memory.words[self.index]) - memory.address) // 8
+        start = memory._first + (getattr(memory.numbers, self.name) - memory.address) // 8
         words = memory._memory[start : memory._ends[start]]
         return words if self.dtype is float else words.view(np.int64)
 
@@ -248,7 +240,7 @@ class Pointers(Array):
 
     def __set__(self, memory: "_Slots", value: "Sequence[Addressed | NDArray[Any] | None]") -> None:
         addresses = np.array([address_of(each) for each in value], dtype=np.int64)
-        memory.words[self.index] = address(addresses)
+        setattr(memory.numbers, self.name, address(addresses))
         memory.pointed.hold(memory._first + self.index, Several(tuple(value), addresses))
 
 
@@ -313,8 +305,6 @@ class _Slots:
     _ends: dict[int, int]
     address: int
     numbers: Any
-    reals: Numbers
-    words: Integers
 
     def __init_subclass__(cls) -> None:
         own = {name: slot for name, slot in vars(cls).items() if isinstance(slot, Slot | Within)}
@@ -342,8 +332,6 @@ class Part(_Slots):
 
     def __init__(self, memory: "Memory", within: "Within[Any]"):
         self._first = within.index
-        end = within.index + self._size
-        self.words, self.reals = memory.words[within.index : end], memory.reals[within.index : end]
         self.numbers = getattr(memory.numbers, within.name)
         self.address = memory.address + 8 * within.index
         self._memory, self._ends, self.pointed = memory._memory, memory._ends, memory.pointed
@@ -433,33 +421,15 @@ class Memory(_Slots):
         """Whether compiled code that is called with it may call Python back: something it points to does."""
         return self.pointed.calls_back
 
-    @property
-    def repointed(self) -> bool:
-        """Whether it points elsewhere than when `content` was called."""
-        return self.pointed.changed
-
-    @property
-    def nbytes(self) -> int:
-        """How many bytes it has, arrays included."""
-        return self._memory.nbytes
-
     def copy(self) -> Self:
         """Return memory of its own with the same content, which points to the same arrays."""
         other = object.__new__(type(self))
-        vars(other).update(vars(self))
-        for part in self.part_of:  # which are this one's
-            vars(other).pop(part, None)
-        other.pointed = Pointed()
+        vars(other).update({k: v for k, v in vars(self).items() if k not in self.part_of})
+        other.pointed = self.pointed.copy()
         other._lies_in(_from_a_line_on(np.empty(self._memory.size + LINE)))
-        other.become(self)
+        other._memory[:] = self._memory
+        other.words[self._indices] += other.address - self.address
         return other
-
-    def become(self, other: Self) -> None:
-        """Take the content of another of the same shape, and point to the same arrays."""
-        self._memory[:] = other._memory
-        self._own, self._indices = other._own, other._indices
-        self.words[self._indices] += self.address - other.address
-        self.pointed.become(other.pointed)
 
     def lasting(self) -> tuple[dict[str, int], dict[str, NDArray[Any]]]:
         """Return copies of what later steps depend on, by the names of the slots: words, and arrays."""
@@ -472,18 +442,6 @@ class Memory(_Slots):
             self.words[self.word_of[name]] = word
         for name, array in arrays.items():
             attrgetter(name)(self)[:] = array
-
-    def content(self) -> "Content":
-        """Return a copy of all that it holds, for `renew`."""
-        self.pointed.changed = False
-        return self._memory.copy(), dict(self.pointed)
-
-    def renew(self, content: "Content") -> None:
-        """Take back what `content` returned."""
-        self._memory[:], pointed = content
-        if self.pointed.changed:
-            self.pointed.become(pointed)
-            self.pointed.changed = False
 
     def point(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Let slots point to arrays, and keep these alive."""

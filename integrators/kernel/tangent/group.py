@@ -1,4 +1,4 @@
-"""The memory of a group of tangent vectors, which serves one trajectory after another."""
+"""The memory of a group of tangent vectors."""
 
 from dataclasses import dataclass
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from integrators.kernel.context import Context, Shape
 from integrators.kernel.native.field import compile_field
-from integrators.kernel.native.memory import Content, aligned
+from integrators.kernel.native.memory import aligned
 from integrators.kernel.step.rule import FIRST_RATE
 from integrators.protocol import Array
 from problems import targets
@@ -47,24 +47,20 @@ class Group:
         The trajectory's; traced.
     contexts : pair of Context
         Of the trajectory, and for its partial steps.
-    count : int
-        Vectors, n >= 1.
+    chosen : Directions
+        Where they begin: n >= 1 vectors at the present state of the trajectory.
     moves : bool
-        Whether they have parts in the parameters.
+        Whether they, or vectors in other groups, have parts in the parameters.
     fresh : dict
         Where contexts are kept that other groups of the same program can copy.
     """
 
-    pulls: Array | None = None
-    """The derivatives of the velocities relative to these, by row; ``None`` where they are 0."""
-    _key: tuple[bytes, bytes] | None = None
-    _contents: tuple[Content, Content]
-
     def __init__(
-        self, system: System, contexts: tuple[Context, Context], count: int, moves: bool,
+        self, system: System, contexts: tuple[Context, Context], chosen: Directions, moves: bool,
         fresh: dict[tuple[int, bool], Context],
     ):  # fmt: skip
-        self._system, self._trajectory, self.count, self._moves = system, contexts[0], count, moves
+        self.count = count = chosen.state.shape[1]
+        self._system, self._trajectory, self._moves = system, contexts[0], moves
         if (count, moves) not in fresh:
             # when it is complete: another thread may copy it at once
             fresh[count, moves] = self._new_context()
@@ -74,38 +70,20 @@ class Group:
             solver, rule = context.solver, base.solver
             solver.tolerance, solver.stagnation = rule.tolerance, rule.stagnation
             solver.log_residual, solver.rate, context.varying = rule.log_residual, FIRST_RATE, base.varying
-        self._state = self.own.state  # where it lies as long as no step is taken
-        self._slots = {
-            context: (context.par, context.factors.velocity) for context in (self.own, self.partial)
-        }
-        dim, rows = contexts[0].shape.dim, contexts[0].shape.rows
+        base = self._trajectory
+        dim, rows = base.shape.dim, base.shape.rows
+        parameters = [base.par, *chosen.parameters.T] if moves else [base.par]
+        for context in (self.own, self.partial):
+            context.par[:] = np.concatenate(parameters)
+            if base.shape.second:
+                context.factors.velocity[: rows * count] = np.tile(base.factors.velocity[:rows], count)
+        self.pulls = self._pulls(chosen)
+        """The derivatives of the velocities relative to these, by row; ``None`` where they are 0."""
         numbers = np.arange(dim * count).reshape(dim, count)
         in_order = numbers.T.reshape(count, -1, rows).swapaxes(0, 1).reshape(-1)  # as `Context.read` has them
         self._indices = np.empty((dim, count), dtype=np.intp)  # of component i of vector v in a state
         self._indices.flat[in_order] = self.own.shape.state_indices
-
-    @property
-    def nbytes(self) -> int:
-        """How many bytes it has, with what it begins with again."""
-        return 2 * (self.own.nbytes + self.partial.nbytes)
-
-    def begin(self, chosen: Directions) -> None:
-        """Put vectors at the present state of the trajectory, whatever was there before."""
-        base = self._trajectory
-        key = base.par.tobytes(), chosen.parameters.tobytes()
-        if self._key is not None:
-            for context, content in zip((self.own, self.partial), self._contents, strict=True):
-                context.renew(content)
-        if key != self._key:
-            parameters = [base.par, *chosen.parameters.T] if self._moves else [base.par]
-            velocity = np.tile(base.factors.velocity[: base.shape.rows], self.count)
-            for par, velocities in self._slots.values():
-                par[:] = np.concatenate(parameters)
-                if base.shape.second:
-                    velocities[: velocity.size] = velocity
-            self.pulls = self._pulls(chosen)
-            self._contents, self._key = (self.own.content(), self.partial.content()), key
-        self._state[self._indices] = chosen.state
+        self.own.state[self._indices] = chosen.state
 
     def read(self) -> Array:
         """Return the vectors at the last step, shape (dim, n)."""

@@ -19,7 +19,7 @@ OPERATIONS = 1000  # of the derivatives of a group, about: unrolled code takes l
 
 
 class Vectors:
-    """The memory of tangent vectors that follow a trajectory from `begin` on, and after it others.
+    """The memory of tangent vectors that follow a trajectory, from its present state on.
 
     Parameters
     ----------
@@ -43,13 +43,11 @@ class Vectors:
         self._context = contexts[0]
         self.shape, moves = directions.state.shape, directions.move_parameters
         dim, count = self.shape
-        self.kind = dim, count, moves
-        """What others must have in common with these to have their memory."""
         operations = len(reachable(system.function(function_of(self._context.shape)).roots))
         most = max(1, min(MOST, OPERATIONS // operations))
         ends = np.cumsum([part.size for part in np.array_split(np.arange(count), -(-count // most))]).tolist()
         self._parts = [slice(*ends_) for ends_ in zip([0, *ends[:-1]], ends, strict=True)]
-        self._groups = [Group(system, contexts, part.stop - part.start, moves, fresh) for part in self._parts]
+        self._groups = [Group(system, contexts, directions.some(part), moves, fresh) for part in self._parts]
         self._memory = memory = Tangents(
             {
                 "dim": dim, "rows": self._context.shape.rows,
@@ -61,26 +59,15 @@ class Vectors:
         memory.own = [group.own for group in self._groups]
         memory.partial = [group.partial for group in self._groups]
         memory.vectors[:] = [group.count for group in self._groups]
-        self.nbytes = sum(group.nbytes for group in self._groups)
-        self._code, self._out = follow.code(), np.empty((0, *self.shape))
+        self._out = np.empty((0, *self.shape))
         self._known: dict[float, Array] = {}
-
-    def begin(self, directions: Directions) -> None:
-        """Follow the trajectory whose memory the contexts have now, from its present state on."""
         self._parameters = directions.parameters
         self._solver: Workspace | None = None  # of the trajectory
         self.solvers: list[Workspace] = []
         """The implicit solvers of the vectors, where there are any."""
-        self._known.clear()
         self.room(FEWEST)
-        if len(self._groups) == 1:
-            self._groups[0].begin(directions)
-        else:
-            for group, part in zip(self._groups, self._parts, strict=True):
-                group.begin(directions.some(part))
-        self._memory.pulls = [group.pulls for group in self._groups]
-        self._memory.failed = 0
-        self._context.follow, self._context.follow_memory = self._code, self._memory
+        memory.pulls = [group.pulls for group in self._groups]
+        self._context.follow, self._context.follow_memory = follow.code(), memory
 
     def solve_by(self, solvers: tuple[Workspace, Workspace]) -> None:
         """Give the vectors the implicit solver of the trajectory and that of its partial steps."""

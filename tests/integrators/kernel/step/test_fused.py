@@ -32,13 +32,13 @@ def test_fused_sweeps_make_the_same_bits(name, settings, monkeypatch):
     problem = problems.load(name)
     times = np.arange(1, 60) * (0.7 * settings["h"])  # partial steps as well
     program = HBVMProgram(problem.system, Plan(**settings))
-    assert program.contexts()[0].fused != 0
+    assert program.contexts(problem.par)[0].fused != 0
     fused = run(problem, settings, times)
     other = not machine.many_registers()
     monkeypatch.setattr(machine, "many_registers", lambda: other)
     assert run(problem, settings, times)[0].tobytes() == fused[0].tobytes()
     monkeypatch.setattr(routes, "FEW_ROWS", 0)
-    assert HBVMProgram(problem.system, Plan(**settings)).contexts()[0].fused == 0
+    assert HBVMProgram(problem.system, Plan(**settings)).contexts(problem.par)[0].fused == 0
     alone = run(problem, settings, times)
     assert fused[0].tobytes() == alone[0].tobytes()
     assert fused[1] == alone[1]
@@ -46,7 +46,7 @@ def test_fused_sweeps_make_the_same_bits(name, settings, monkeypatch):
 
 def test_larger_systems_wider_methods_and_other_masses_are_not_fused():
     def fused(problem, **settings):
-        return HBVMProgram(problem.system, Plan(**settings)).contexts()[0].fused != 0
+        return HBVMProgram(problem.system, Plan(**settings)).contexts(problem.par)[0].fused != 0
 
     assert not fused(problems.load("outer_solar_system"), k=8, s=8, h=1.0)
     assert not fused(problems.load("kepler"), k=20, s=8, h=0.1)

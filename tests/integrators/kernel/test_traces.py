@@ -1,7 +1,6 @@
-"""The memory of trajectories that are over serves others, which have the bits of their own."""
+"""What a program has integrated before leaves no trace in what it integrates next."""
 
 import threading
-from typing import Any
 
 import numpy as np
 import pytest
@@ -11,8 +10,6 @@ from hypothesis import strategies as st
 import problems
 from integrators import HBVM, Event, Gauss, LineIntegral, integrate, integrate_many
 from integrators.events.event import named
-from integrators.kernel import spare
-from integrators.running.integrate import prepared as made_before
 
 KEPLER = problems.load("kepler")
 STIFF = problems.Problem(
@@ -25,10 +22,6 @@ SPRING = problems.Hamiltonian(
     dof=1,
     parameters={"k": 1.0, "mass": 1.0},
 )
-
-
-def prepared(method, system) -> Any:
-    return made_before(method, system)[0]
 
 
 METHODS = [
@@ -67,58 +60,10 @@ SPRINGS = st.builds(
     sample=st.sampled_from(["steps", "stop", None]),
 )
 def test_what_was_integrated_before_leaves_no_trace(method, others, last, sample):
-    made = prepared(method, SPRING)
-    made.spare = spare.Spare()
     alone = bits(integrate(last, method, sample=sample))
     for other in others:
         integrate(other, method, sample=sample)
     assert bits(integrate(last, method, sample=sample)) == alone
-
-
-def test_the_memory_is_the_same_one():
-    made = prepared(HBVM(), KEPLER.system)
-    made.spare = spare.Spare()
-    first, second = (made.start(KEPLER.y0, KEPLER.par) for _ in range(2))
-    place = first._context.address
-    del first
-    third, fourth = (made.start(KEPLER.y0, KEPLER.par) for _ in range(2))
-    assert third._context.address == place
-    assert len({place, second._context.address, fourth._context.address}) == 3
-
-
-def test_what_others_know_stays_theirs():
-    made = prepared(HBVM(), KEPLER.system)
-    made.spare = spare.Spare()
-    records = made.start(KEPLER.y0, KEPLER.par)
-    records.record(records.recorder(8))
-    del records
-    assert made.spare.take() is None
-
-
-def _searched(program, event, y0, end):
-    start = program.with_events(KEPLER, {"crossing": event})
-    stepper = start(y0, KEPLER.par, 0.0, end)
-    stepper.advance([end])
-    stepper.look_to(end)
-    return start, stepper
-
-
-def test_a_search_for_events_keeps_its_memory_as_long_as_somebody_has_it():
-    made = prepared(HBVM(), KEPLER.system)
-    made.spare = spare.Spare()
-    _, stepper = _searched(made, Event(lambda q: q[1]), KEPLER.y0, 10.0)
-    search = stepper.search
-    del stepper
-    assert made.spare.take() is None
-    found = integrate(KEPLER, HBVM(), 10.0, events=Event(lambda q: q[1], name="crossing")).events["crossing"]
-    assert np.array_equal(search.hits.occurrences()["crossing"].t, found.t)
-    made.spare = spare.Spare()
-    _, stepper = _searched(made, Event(lambda q: q[1]), KEPLER.y0, 10.0)
-    place = stepper._context.address
-    del stepper
-    pair = made.spare.take()
-    assert pair is not None
-    assert pair.own.address == place
 
 
 @pytest.mark.parametrize("method", [HBVM(), HBVM(k=8, s=4, h=0.05)], ids=repr)
@@ -170,22 +115,6 @@ def test_what_is_no_number_is_not_handed_on(method):
     alone = bits(integrate(goes, method))
     assert integrate(fails, method).status.failed
     assert bits(integrate(goes, method)) == alone
-
-
-def test_neither_large_memory_nor_much_is_kept(monkeypatch):
-    made = prepared(HBVM(), KEPLER.system)
-
-    def kept():
-        made.spare = spare.Spare()
-        steppers = [made.start(KEPLER.y0, KEPLER.par) for _ in range(spare.PAIRS + 2)]
-        del steppers
-        return len([pair for _ in range(spare.PAIRS + 2) if (pair := made.spare.take())])
-
-    size = made.contexts()[0].nbytes
-    monkeypatch.setattr(spare, "BYTES", size - 1)
-    assert kept() == 0
-    monkeypatch.setattr(spare, "BYTES", size)
-    assert kept() == spare.PAIRS
 
 
 def test_two_threads_have_memory_of_their_own():

@@ -1,14 +1,10 @@
-"""The memory of tangent vectors serves others, which have the bits of those of a fresh program."""
-
-from typing import Any
+"""What followed trajectories of a program before leaves no trace in the tangent vectors of the next."""
 
 import numpy as np
 import pytest
 
 import problems
 from integrators import HBVM, Gauss, integrate
-from integrators.kernel import spare
-from integrators.running.integrate import prepared
 
 KEPLER = problems.load("kepler")
 SPRING = problems.Hamiltonian(
@@ -30,12 +26,6 @@ def alone(problem, method, **asked):
     solution = integrate(problem, method, **asked)
     vars(problem.system)["_programs"] = kept
     return solution
-
-
-def program(method, system) -> Any:
-    made = prepared(method, system)[0]
-    made.spare = spare.Spare()
-    return made
 
 
 def vectors(dim, count, seed):
@@ -76,7 +66,6 @@ CASES = {
 @pytest.mark.parametrize("sample", ["steps", "stop", "partial"])
 def test_what_followed_before_leaves_no_trace(method, name, sample):
     cases = CASES[name]
-    program(method, cases[0][0].system)
     expected = [
         alone(
             problem, method, times=[0.0, 0.6 * problem.t_end, problem.t_end], sample=sample, variations=wanted
@@ -94,29 +83,10 @@ def test_what_followed_before_leaves_no_trace(method, name, sample):
         assert found.stats.extra["variations"] == expected[i].stats.extra["variations"], i
 
 
-def started(made, count):
-    stepper = made.start(KEPLER.y0, KEPLER.par)
-    stepper.follow(np.eye(4)[:, :count], np.zeros((0, count)))
-    return stepper
-
-
-def test_the_memory_is_the_same_one():
-    made = program(HBVM(), KEPLER.system)
-    first = started(made, 1)
-    place = first._vectors
-    first.advance([1.0])
-    del first
-    second = started(made, 3)  # of the same trajectory's memory, but not of the same vectors
-    assert second._vectors is not place
-    del second
-    third, fourth = started(made, 1), started(made, 1)
-    assert third._vectors is place
-    assert fourth._vectors is not place
-
-
 def test_vectors_do_not_follow_the_next_trajectory():
-    made = program(HBVM(), KEPLER.system)
-    first = started(made, 2)
+    made = HBVM().compile(KEPLER.system)
+    first = made.start(KEPLER.y0, KEPLER.par)
+    first.follow(np.eye(4)[:, :2], np.zeros((0, 2)))
     first.advance([1.0])
     del first
     second = made.start(KEPLER.y0, KEPLER.par)
@@ -127,7 +97,7 @@ def test_vectors_do_not_follow_the_next_trajectory():
 
 @pytest.mark.parametrize("method", [HBVM(), Gauss(s=4, h=0.05)], ids=repr)
 def test_other_vectors_of_the_same_trajectory(method):
-    made = program(method, KEPLER.system)
+    made = method.compile(KEPLER.system)
     ends = []
     for before in ([], [1], [3, 1]):
         stepper = made.start(KEPLER.y0, KEPLER.par)
@@ -140,19 +110,3 @@ def test_other_vectors_of_the_same_trajectory(method):
         ends.append(stepper.variations)
     assert np.array_equal(ends[0], ends[1])
     assert np.array_equal(ends[0], ends[2])
-
-
-def test_neither_many_vectors_nor_implicit_solvers_are_kept(monkeypatch):
-    made = program(HBVM(), KEPLER.system)
-    first = started(made, 1)
-    size, kept = first._vectors.nbytes, first._vectors
-    del first
-    monkeypatch.setattr(spare, "BYTES_OF_VECTORS", size - 1)
-    assert started(made, 1)._vectors is kept  # it was kept before
-    assert started(made, 2)._vectors is not started(made, 2)._vectors
-    problem, _ = CASES["driven"][1]
-    made = program(HBVM(), problem.system)
-    assert integrate(problem, HBVM(), [1.0], variations="y0").stats.extra["implicit"]["steps"] > 0
-    pair = made.spare.take()
-    assert pair is not None
-    assert not pair._vectors
