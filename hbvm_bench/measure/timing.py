@@ -8,10 +8,10 @@ import math
 import os
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from statistics import median, quantiles
 from typing import Any, Literal
 
@@ -109,14 +109,15 @@ def interleaved(
     rounds: int,
     *,
     order: Order = "alternating",
-    turns: Sequence[Collection[int]] | None = None,
+    takes_part: Callable[[int, int], bool] = lambda i, number: True,
     begin: Callable[[int], None] = lambda number: None,
 ) -> list[list[float]]:
     """Take one sample of each in every round, so that what else the machine does meets them all.
 
     A sample is taken by a call that returns its seconds. The order of the rounds is that given, another in
-    each, or backwards in every other one. ``turns`` are the rounds, from 0, in which each takes part (all by
-    default), and ``begin`` is called with the number of a round before it. Returned are the seconds of each.
+    each, or backwards in every other one. ``takes_part(i, number)`` says, right before, whether the i-th has
+    a sample in the round with this number, from 0; ``begin`` is called with the number of a round before it.
+    Returned are the seconds of each.
     """
     taken: list[list[float]] = [[] for _ in samples]
     shuffle = np.random.default_rng(ORDER_SEED)
@@ -128,7 +129,7 @@ def interleaved(
         elif order == "alternating" and number % 2:
             places.reverse()
         for i in places:
-            if turns is None or number in turns[i]:
+            if takes_part(i, number):
                 taken[i].append(samples[i]())
     return taken
 
@@ -192,46 +193,61 @@ def time_together(
     """Take the samples of the runs of one problem, interleaved round by round in this process.
 
     ``rounds`` are the numbers of this process's, its ``compilation`` among the plan's. Every round begins
-    with a garbage collection and one sample of the calibration. A run that is too slow for all rounds within
-    the plan's budget takes part in fewer of them; one that does not reach the end has none, with the reason.
+    with a garbage collection and one sample of the calibration. Before the first, every run has gone a
+    hundredth of its interval. In the first, a whole run tells how many make a sample, and is the sample where
+    one does. A run that is too slow for all rounds within the plan's budget takes part in fewer of them; one
+    that does not reach the end has none, with the reason.
     """
-    clock = CLOCKS[plan.clock]
-    firsts, calls = [], []
+    clock, budget = CLOCKS[plan.clock], plan.budget * len(rounds) / plan.rounds
+    calls = []
     for run in runs:
         run.until(WARM_UP).seconds()
-        firsts.append(run.seconds(clock=clock))
         calls.append(run.until(NOWHERE).seconds(CALLS, clock)[0])
-    fine = [i for i, (_, reached) in enumerate(firsts) if reached.status is Status.FINISHED]
-    repeats = {i: repeats_for(firsts[i][0], plan.shortest) for i in fine}
-    budget = plan.budget * len(rounds) / plan.rounds
-    fitting = {i: int(budget / max(firsts[i][0] * repeats[i], 1e-9)) for i in fine}
-    turns = {i: spread_evenly(count, rounds) for i, count in fitting.items()}
+    firsts: dict[int, tuple[float, Samples]] = {}
+    repeats = [1] * len(runs)
+    turns = [list(rounds) for _ in runs]
     calibration: list[float] = []
 
-    def begin(number: int) -> None:
+    def begin(place: int) -> None:
+        del place
         gc.collect()
         calibration.append(calibrate(clock))
 
+    def sample(i: int) -> float:
+        if i in firsts:
+            return runs[i].seconds(repeats[i], clock)[0]
+        spent, reached = firsts[i] = runs[i].seconds(clock=clock)
+        if reached.status is not Status.FINISHED:
+            turns[i] = [rounds[0]]
+            return spent
+        repeats[i] = repeats_for(spent, plan.shortest)
+        turns[i] = spread_evenly(int(budget / max(spent * repeats[i], 1e-9)), rounds)
+        return spent if repeats[i] == 1 else sample(i)
+
     before = busy()
-    samples = [lambda i=i: runs[i].seconds(repeats[i], clock)[0] for i in fine]
-    mine = [[place for place, number in enumerate(rounds) if number in turns[i]] for i in fine]
-    taken = interleaved(samples, len(rounds), order=plan.order, turns=mine, begin=begin)
+    taken = interleaved(
+        [partial(sample, i) for i in range(len(runs))],
+        len(rounds),
+        order=plan.order,
+        takes_part=lambda i, place: rounds[place] in turns[i],
+        begin=begin,
+    )
     load = load_between(before, busy())
-    timings = [_unfinished(reached) for _, reached in firsts]
-    for i, seconds in zip(fine, taken, strict=True):
-        fixed = {"repeats": repeats[i], "compile": _compilation(runs[i]), "compilation": compilation}
+    timings = []
+    for i, (run, seconds, call) in enumerate(zip(runs, taken, calls, strict=True)):
+        first, reached = firsts[i]
+        if reached.status is not Status.FINISHED:
+            timings.append(Timing(why=f"not timed: the integration ended as {reached.status.value}"))
+            continue
+        fixed = {"repeats": repeats[i], "compile": _compilation(run), "compilation": compilation}
         taking = [
             TimingRound(samples=[sample], calibration=[calibration[rounds.index(n)]], number=n, **fixed)
             for n, sample in zip(turns[i], seconds, strict=True)
         ]
-        few = f"{len(taking)} of {len(rounds)} rounds: a run takes {firsts[i][0]:.2g} s"
+        few = f"{len(taking)} of {len(rounds)} rounds: a run takes {first:.2g} s"
         why = few * (len(taking) < len(rounds))
-        timings[i] = Timing(rounds=taking, why=why, call=calls[i], load=load)
+        timings.append(Timing(rounds=taking, why=why, call=call, load=load))
     return timings
-
-
-def _unfinished(reached: Samples) -> Timing:
-    return Timing(why=f"not timed: the integration ended as {reached.status.value}")
 
 
 def _compilation(run: Timeable) -> Compile:

@@ -67,10 +67,10 @@ stopping = threading.Event()
 """Set while all cases are to end."""
 
 
-def empty_caches(directory: Path) -> dict[str, str]:
-    """Return the environment in which every library compiles anew: its caches are in this directory.
+def caches_in(directory: Path) -> dict[str, str]:
+    """Return the environment in which every library keeps its compiled code in this directory.
 
-    All libraries keep their compiled code below the user's own directories, so these are moved.
+    All of them keep it below the user's own directories, so these are moved.
     """
     return {
         "HOME": str(directory),

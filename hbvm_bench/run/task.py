@@ -1,7 +1,6 @@
 """What is asked of a process that runs cases, what it answers, and the row that comes of it."""
 
 import platform
-import tempfile
 import threading
 from datetime import UTC, datetime
 from pathlib import Path
@@ -232,20 +231,18 @@ def _result(ended: Ended, answer: Answer, limits: Limits) -> tuple[Result, bytes
     return result, answer.series
 
 
-def timed(request: Request) -> list[Timing]:
+def timed(request: Request, caches: Path | None = None) -> list[Timing]:
     """Return the times of the cases of a request, which one new process takes in turn, or why it has none.
 
-    Where the rounds are shared among several compilations, it compiles anew.
+    With ``caches`` it looks for compiled code in that directory, and keeps it there.
 
     Raises what `asked` does.
     """
-    assert request.plan is not None
-    with tempfile.TemporaryDirectory(prefix="hbvm-bench-") as scratch:
-        process = Child(child.empty_caches(Path(scratch)) if request.plan.compilations > 1 else {})
-        try:
-            ended, answer = asked(process, request)
-        finally:
-            process.close()
+    process = Child(child.caches_in(caches) if caches else {})
+    try:
+        ended, answer = asked(process, request)
+    finally:
+        process.close()
     if answer.timings:
         return records.decoded(answer.timings, list[Timing])
     return [Timing(why=f"not timed: {ENDINGS.get(ended.cause, ended.words)}")] * len(request.rows)

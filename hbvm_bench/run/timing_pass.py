@@ -1,8 +1,10 @@
 """The timing pass: one process takes the cases of a problem in turn, alone and without output."""
 
 import math
+import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime
+from pathlib import Path
 from statistics import median
 from types import MappingProxyType
 
@@ -59,7 +61,9 @@ def time_cases(
             tell(group[0][0])
             read = [reading.up_to_date(store, row) for _, row in group]
             errors = asked.get(group[0][0].case.problem, ())
-            timings = _together(group, read, plan, limits, core, errors)
+            with tempfile.TemporaryDirectory(prefix="hbvm-bench-") as scratch:
+                caches = Path(scratch) if plan.compilations > 1 else None
+                timings = _together(group, read, plan, limits, core, errors, caches)
             process = datetime.now(UTC).isoformat()
             taken = [replace(timing, plan=plan, machine=here, process=process) for timing in timings]
             store.renew([replace(row, timing=t) for (_, row), t in zip(group, taken, strict=True)])
@@ -111,8 +115,13 @@ def _together(
     limits: Limits,
     core: int | None,
     asked: Sequence[Accuracy],
+    caches: Path | None,
 ) -> list[Timing]:
-    """Time the cases of a problem in turn, but for those on another trajectory."""
+    """Time the cases of a problem in turn, but for those on another trajectory.
+
+    Where several processes share the rounds, the first begins with empty ``caches``. The others load from
+    them what a library keeps: the same machine code, at another place in memory.
+    """
     pairs = zip((case for case, _ in group), records, strict=True)
     on = [(case, record) for case, record in pairs if not record.result.violation]
     together = replace(
@@ -139,7 +148,7 @@ def _together(
             compilation=place,
             core=core,
         )
-        parts = timed(request)
+        parts = timed(request, caches)
         for (case, _), part in zip(going, parts, strict=True):
             taken[case.id].append(part)
         if plan.front and not place:

@@ -202,8 +202,9 @@ class Timing(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def compile(self) -> Compile | None:
-        """Return the compilation with the median seconds."""
+        """Return the compilation with the median seconds, of those not from a cache if there are any."""
         compiles = sorted((round_.compile for round_ in self.rounds), key=lambda c: c.seconds)
+        compiles = [compile_ for compile_ in compiles if not compile_.cached] or compiles
         return compiles[(len(compiles) - 1) // 2] if compiles else None
 
 

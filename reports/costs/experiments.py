@@ -15,7 +15,7 @@ import problems
 from hbvm_bench.campaign.identity import make_method
 from hbvm_bench.measure import machine
 from hbvm_bench.measure.timing import busy, interleaved, load_between, no_collection
-from hbvm_bench.run.child import ENVIRONMENT, empty_caches
+from hbvm_bench.run.child import ENVIRONMENT, caches_in
 from hbvm_bench.store.records import Load
 from integrators import integrate, start
 from integrators.protocol import Status
@@ -150,7 +150,7 @@ def _fresh(method: str, caches: Path) -> float:
     begun = time.perf_counter()
     with subprocess.Popen(
         [sys.executable, "-c", PROGRAM.format(method=method)],
-        env={**os.environ, **ENVIRONMENT, **empty_caches(caches)},
+        env={**os.environ, **ENVIRONMENT, **caches_in(caches)},
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,

@@ -168,7 +168,9 @@ def test_a_setting_too_slow_for_all_rounds_takes_part_in_some_of_them():
             assert sorted(set(chosen)) == chosen
             assert {*map(timing.chooses, chosen)} == {False, True}
             assert max(chosen) < rounds
-    taken = timing.interleaved([lambda: 1.0, lambda: 2.0], 3, turns=[[0, 1, 2], [1]])
+    taken = timing.interleaved(
+        [lambda: 1.0, lambda: 2.0], 3, takes_part=lambda i, number: i == 0 or number == 1
+    )
     assert taken == [[1.0, 1.0, 1.0], [2.0]]
 
 
@@ -211,3 +213,20 @@ def test_a_calibration_by_the_clock_of_the_thread_leaves_out_what_others_do():
     timing.calibrate()  # compiled
     ticks = iter((3.0, 5.0))
     assert timing.calibrate(lambda: next(ticks)) == 2.0
+
+
+@pytest.mark.parametrize(("lasts", "runs", "repeats"), [(1.0, [1, 1, 1], 1), (0.01, [1, 3, 3, 3], 3)])
+def test_the_first_run_of_a_long_integration_is_its_first_sample(monkeypatch, lasts, runs, repeats):
+    ran = []
+    monkeypatch.setattr(timing, "calibrate", lambda clock: 0.01)
+
+    class Counted(timing.SingleRun):
+        def seconds(self, repeats=1, clock=time.perf_counter):
+            if self.t_end == 1.0:
+                ran.append(repeats)
+            return lasts, super().seconds(repeats, clock)[1]
+
+    run = Counted.compiled(problems.load("pendulum", t_end=1.0), Landing())
+    (taken,) = timing.time_together([run], TimingPlan(rounds=3, shortest=0.02, budget=100.0), [0, 1, 2])
+    assert ran == runs
+    assert [round_.repeats for round_ in taken.rounds] == [repeats] * 3

@@ -249,15 +249,15 @@ def test_a_slow_setting_that_is_chosen_is_compared_in_rounds_that_did_not_choose
     assert numbers == [[0, 4], [0, 1, 2, 4, 5], [0, 1, 2, 3, 4, 5]]
 
 
-@pytest.mark.slow  # our kernel is compiled twice from nothing
-def test_each_compilation_begins_with_empty_caches(store):
+@pytest.mark.slow  # our kernel is compiled from nothing
+def test_the_first_of_several_compilations_begins_with_empty_caches_which_the_others_share(store):
     plan = TimingPlan(rounds=2, shortest=1e-6, compilations=2)
     one = resolve(case("Gauss(s=2, h=0.1)"))
     run_case(one.case, str(store.directory), GENEROUS)
     timing_pass.time_cases([one], store, plan, GENEROUS)
-    rounds = store.load(one.id).timing.rounds
-    assert [round_.compile.cached for round_ in rounds] == [False, False]
-    assert min(round_.compile.seconds for round_ in rounds) > 0.5  # of the order of 5 s
+    timing = store.load(one.id).timing
+    assert [round_.compile.cached for round_ in timing.rounds] == [False, True]
+    assert timing.compile.seconds > 0.5  # of the order of 5 s; from the cache 0.1
 
 
 def test_a_problem_is_timed_again_as_a_whole_where_one_of_its_cases_has_no_rounds(toys, store):

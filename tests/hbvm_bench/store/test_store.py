@@ -225,6 +225,7 @@ def test_a_timing_keeps_its_samples_and_tells_median_and_quartiles():
     timing = Timing(rounds=rounds)
     assert timing.samples == [1.0, 2.0, 3.0, 4.0, 9.0]
     assert timing.summary == {"median": 3.0, "min": 1.0, "q1": 2.0, "q3": 4.0}
-    assert timing.compile == Compile(seconds=0.2, cached=True)
+    assert timing.compile == Compile(seconds=2.0, cached=False)
+    assert Timing(rounds=rounds[1:]).compile == Compile(seconds=0.1, cached=True)
     assert Timing(why="x").summary == {}
     assert Timing(rounds=rounds[2:]).summary == {"median": 9.0, "min": 9.0, "q1": 9.0, "q3": 9.0}
