@@ -56,8 +56,9 @@ class TimingPlan(msgspec.Struct, frozen=True, kw_only=True):
         Of the wall, or CPU time of this thread, or for all threads of this process, in which other work on
         the machine does not count.
     compilations : int
-        Fresh processes with empty caches among which the rounds are shared, for one compilation of a method
-        may be slower than the next. Those that choose a setting do not compare it.
+        Fresh processes among which the rounds are shared, for a method may be slower in one than in the next:
+        its code lies elsewhere. The first begins with empty caches. Those that choose a setting do not
+        compare it.
     front : bool
         Whether a setting that the first compilation shows to be far behind others is not timed again; see
         `hbvm_bench.summaries.front`.

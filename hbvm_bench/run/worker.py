@@ -39,6 +39,7 @@ from problems.errors import InputError
 
 DISK = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 GROWTH = 2**16  # KiB that a process may have grown by since its first case and still serve another one
+ROOM = 2**20  # and since its first computation, of which no memory is reported
 
 Measured = tuple[Result, Series]
 
@@ -68,7 +69,8 @@ def main() -> None:
         memory.forget_peak()
         held = memory.own_peak()
         size = size or held
-        leaves = answer.leaves or held - size > GROWTH or psutil.Process().children()
+        most = GROWTH if request.computation is None else ROOM
+        leaves = answer.leaves or held - size > most or psutil.Process().children()
         sys.stdout.flush()
         sys.stderr.flush()
         child.send(answers, (child.LEAVES if leaves else child.STAYS) + msgspec.msgpack.encode(answer))

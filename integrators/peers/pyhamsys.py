@@ -1,7 +1,7 @@
 """pyhamsys' symplectic compositions of a map and its adjoint, with compiled maps."""
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, Literal
 
 import numpy as np
@@ -125,7 +125,11 @@ def maps(system: System, type: str) -> tuple[Any, Any]:  # noqa: A002
     pyhamsys hands chi the time after the map, chi* that before it. The time goes on with the drift: a kick
     that comes first is at the time before the map, one that comes last at that after it.
     """
-    last = type in KICK_LAST
+    return _maps(system, last=type in KICK_LAST)
+
+
+@lru_cache(maxsize=16)  # the same for every step and every composition
+def _maps(system: System, *, last: bool) -> tuple[Any, Any]:
     import numba
 
     from problems import targets
