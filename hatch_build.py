@@ -1,4 +1,4 @@
-"""What hatchling runs before it makes a wheel: it lowers the kernel, so that a first use is a short one."""
+"""What hatchling runs before it makes a wheel: it compiles the kernel, so that a first use is a short one."""
 
 import subprocess
 import sys
@@ -7,14 +7,14 @@ from typing import Any
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 
-class LoweredKernel(BuildHookInterface[Any]):
-    """Writes ``integrators/kernel/lowered``, if numba and what the kernel needs are there."""
+class CompiledKernel(BuildHookInterface[Any]):
+    """Writes ``integrators/kernel/shipped``, if numba and what the kernel needs are there."""
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        command = [sys.executable, "-c", "from integrators.kernel import ahead; ahead.lower()"]
+        command = [sys.executable, "-c", "from integrators.kernel import ahead; ahead.ship()"]
         made = subprocess.run(command, cwd=self.root, capture_output=True, text=True, check=False)
         if made.returncode:
             last = made.stderr.strip().splitlines()[-1:]
             self.app.display_warning(
-                f"the kernel is not lowered ahead, {' '.join(last)}: a first use takes some seconds longer."
+                f"the kernel is not compiled ahead, {' '.join(last)}: a first use takes some seconds longer."
             )

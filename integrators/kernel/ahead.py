@@ -18,7 +18,7 @@ from integrators.kernel.engines import (
     steps,
 )
 from integrators.kernel.ensemble.prepared import LANES
-from integrators.kernel.native import lowered
+from integrators.kernel.native import shipped
 from integrators.kernel.routes import FEW_ROWS
 
 ENGINES = {
@@ -65,12 +65,15 @@ def compile_ahead(processes: int = 1) -> dict[str, float | None]:
         return dict(pool.map(_compile, ENGINES))
 
 
-def lower() -> None:
-    """Write the text of LLVM that every machine of this system can start from, where the package is built."""
-    texts = {engine.key: engine.lower() for engine in ENGINES.values()}
-    for around, forms in ((iterations, FORMS), (lanes, WIDTHS)):
-        texts |= {around.key(form): around.lower(form) for form in forms}
-    lowered.write(texts)
+def ship() -> None:
+    """Write what every machine of this system can start from, where the package is built."""
+    codes = {key: code for engine in ENGINES.values() for key, code in engine.for_levels().items()}
+    texts = {
+        around.key(form): around.lower(form)
+        for around, forms in ((iterations, FORMS), (lanes, WIDTHS))
+        for form in forms
+    }
+    shipped.write(codes, texts)
 
 
 def _compile(name: str) -> tuple[str, float | None]:

@@ -13,7 +13,7 @@ from typing import Any
 
 import llvmlite
 
-from integrators.kernel.native import binary, lowered, machine, stages, store
+from integrators.kernel.native import binary, machine, shipped, stages, store
 from integrators.kernel.native.engine import KERNEL
 from integrators.kernel.native.field import BUILT_BY
 from integrators.kernel.native.stages import ON_LANES
@@ -109,7 +109,7 @@ define void @{machine.ENTRY}({arguments}) alignstack(64) "stackrealign" {{
         name = store.key(key, llvmlite.__version__)
         if (kept := store.get(name)) is not None:
             return kept.decode("ascii")
-        text = lowered.get(key) or self.lower(form)
+        text = shipped.text(key) or self.lower(form)
         store.put(name, text.encode("ascii"))
         return text
 

@@ -181,16 +181,10 @@ def lower(function: Any, arguments: Sequence[tuple[Any, str]], returns: str = "v
         return str(machine.simplified(_linked(function, arguments, returns)))
 
 
-def build_lowered(text: str) -> bytes:
-    """Return an object file of what `lower` has returned, without numba; its results are those of `build`.
-
-    Raises
-    ------
-    RuntimeError
-        If this LLVM cannot read it.
-    """
+def build_for(level: str, text: str) -> bytes:
+    """Return an object file of what `lower` returned for one of `machine.LEVELS`, with the results of `build`."""
     with machine.alone():
-        return machine.optimized(llvm.parse_assembly(text), machine.object_file)
+        return machine.optimized(llvm.parse_assembly(text), machine.object_file, level)
 
 
 def assembly(function: Any, arguments: Sequence[tuple[Any, str]], returns: str = "void") -> str:

@@ -3,12 +3,11 @@
 import ctypes
 import sys
 from collections.abc import Callable
-from contextlib import suppress
 from functools import cached_property, partial
 from importlib import import_module
 from typing import Any
 
-from integrators.kernel.native import binary, lowered, store
+from integrators.kernel.native import binary, machine, shipped, store
 from integrators.kernel.native.memory import Memory
 from integrators.kernel.native.raised import Interrupts, raise_kept
 
@@ -43,17 +42,18 @@ class Engine:
         """Return the machine code."""
 
         def make() -> tuple[str, bytes]:
+            level = machine.level()
+            if level is not None and (code := shipped.code(f"{self.key} {level}")) is not None:
+                return " ", code
             _say_what_is_waited_for()
-            if (text := lowered.get(self.key)) is not None:
-                with suppress(RuntimeError):
-                    return " ", binary.build_lowered(text)
             return " ", binary.build(*self._compiled())
 
         return binary.obtain(self.key, make)
 
-    def lower(self) -> str:
-        """Return it as LLVM's text; see `integrators.kernel.native.lowered`."""
-        return binary.lower(*self._compiled())
+    def for_levels(self) -> dict[str, bytes]:
+        """Return machine code for each of `machine.levels`; see `integrators.kernel.native.shipped`."""
+        text = binary.lower(*self._compiled())
+        return {f"{self.key} {level}": binary.build_for(level, text) for level in machine.levels()}
 
     def _compiled(self) -> tuple[Any, list[tuple[Any, str]], str]:
         from numba import types

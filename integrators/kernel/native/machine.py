@@ -14,6 +14,16 @@ import llvmlite.binding as llvm
 
 ENTRY = "hbvm_entry"
 
+LEVELS: dict[str, dict[str, frozenset[str]]] = {
+    "x86_64": {
+        "x86-64-v4": frozenset({"avx2", "avx512bw", "avx512cd", "avx512dq", "avx512f", "avx512vl", "fma"}),
+        "x86-64-v3": frozenset({"avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe"}),
+    },
+    "aarch64": {"generic": frozenset()},
+    "arm64": {"generic": frozenset()},
+}
+"""Processors that code is shipped for, the best ones first: LLVM's names, and the features that tell them."""
+
 Result = TypeVar("Result", bytes, str)
 
 lock = threading.RLock()
@@ -46,9 +56,9 @@ def entered(
     return module
 
 
-def optimized(module: Any, emit: Callable[[Any, Any], Result]) -> Result:
-    """Return what is emitted of a module that is optimized for this processor."""
-    machine = _machine()
+def optimized(module: Any, emit: Callable[[Any, Any], Result], level: str | None = None) -> Result:
+    """Return what is emitted of a module that is optimized for this processor, or for one of `LEVELS`."""
+    machine = _machine(level)
     options = llvm.create_pipeline_tuning_options(speed_level=3)
     builder = llvm.create_pass_builder(machine, options)
     builder.getModulePassManager().run(module, builder)
@@ -101,6 +111,18 @@ def features() -> str:
     return llvm.get_host_cpu_features().flatten() if given is None else given
 
 
+def levels() -> list[str]:
+    """Return the names in `LEVELS` of this kind of processor; none where none is shipped."""
+    return list(LEVELS.get(llvm.get_process_triple().split("-")[0], {}))
+
+
+def level() -> str | None:
+    """Return the best one of `levels` whose instructions code may use."""
+    allowed = {feature[1:] for feature in features().split(",") if feature.startswith("+")}
+    needed = LEVELS.get(llvm.get_process_triple().split("-")[0], {})
+    return next((name for name, all_of in needed.items() if all_of <= allowed), None)
+
+
 def many_registers() -> bool:
     """Whether the processor has 32 registers of eight doubles, and not 16 of four or 32 of two."""
     return "+avx512f" in features().split(",")
@@ -134,11 +156,11 @@ def _initialize() -> None:
         llvm.load_library_permanently(library)
 
 
-def _machine() -> Any:
+def _machine(level: str | None = None) -> Any:
     _initialize()
     return llvm.Target.from_triple(llvm.get_process_triple()).create_target_machine(
-        cpu=processor(),
-        features=features(),
+        cpu=level or processor(),
+        features="" if level else features(),
         opt=3,
         codemodel="jitdefault",
         jit=True,

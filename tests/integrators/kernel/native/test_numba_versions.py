@@ -10,9 +10,9 @@ import pytest
 HIDE = """
 import sys, numba
 from importlib import import_module
-from integrators.kernel.native import lowered
+from integrators.kernel.native import shipped
 from pathlib import Path
-lowered.FOLDER = Path("nowhere")  # else most of the kernel were compiled already
+shipped.FOLDER = Path("nowhere")  # else most of the kernel were compiled already
 def hide(part):
     module, name = part.split(":")
     delattr(import_module(module), name)
