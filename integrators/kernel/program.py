@@ -41,7 +41,6 @@ from problems import targets
 from problems.errors import InputError
 from problems.problem import Problem, System
 
-
 SEARCHES = 8
 """For events, that are kept at most; see `HBVMProgram.with_events`."""
 

@@ -182,7 +182,7 @@ def lower(function: Any, arguments: Sequence[tuple[Any, str]], returns: str = "v
 
 
 def build_for(level: str, text: str) -> bytes:
-    """Return an object file of what `lower` returned for one of `machine.LEVELS`, with the results of `build`."""
+    """Return an object file of what `lower` returned, for one of `machine.LEVELS`, with `build`'s results."""
     with machine.alone():
         return machine.optimized(llvm.parse_assembly(text), machine.object_file, level)
 
