@@ -43,8 +43,9 @@ class Event(CheckedOptions):
     ----------
     g : callable
         A function that returns a number; its arguments are among ``t, q, p, y, par, m``, as for a
-        Hamiltonian. It is traced once and then evaluated on whole arrays. A function that cannot be traced
-        (comparisons, NumPy, any other code) is called with numbers for each state, which is slow.
+        Hamiltonian. It is traced once and then evaluated on whole arrays: a number that it takes from outside
+        is the one at the first integration; for another number, make another event. A function that cannot
+        be traced (comparisons, NumPy, any other code) is called with numbers for each state, which is slow.
     direction : {0, 1, -1}
         1: only zeros at which g increases in the direction of integration (also backwards in time), -1: only
         those at which it decreases, 0: all, also where g touches zero.

@@ -66,12 +66,12 @@ class EventLog:
         if self.terminal is not None:
             return
         for i, limit in enumerate(self._limits):
-            here = np.flatnonzero(event[order] == i)
-            left = limit - self.counts[i]
-            if limit and here.size >= left:
-                order, self.terminal = order[: here[left - 1] + 1], self.names[i]
-        for i in range(len(self._limits)):
-            self.counts[i] += int(np.count_nonzero(event[order] == i))
+            if limit:
+                here, left = np.flatnonzero(event[order] == i), limit - self.counts[i]
+                if here.size >= left:
+                    order, self.terminal = order[: here[left - 1] + 1], self.names[i]
+        happened = np.bincount(event[order], minlength=len(self.counts)).tolist()
+        self.counts = [before + more for before, more in zip(self.counts, happened, strict=True)]
         if self.terminal is not None:
             self.stop = float(t[order[-1]])
         if order.size:
@@ -100,6 +100,8 @@ class EventLog:
         return result
 
     def _joined(self) -> "_Piece":
+        if len(self._pieces) == 1:
+            return self._pieces[0]
         none, nowhere, no_par = np.empty(0, dtype=np.int64), *(np.empty((0, n)) for n in self._widths)
         pieces = [*self._pieces, (np.empty(0), nowhere, nowhere, none, none, no_par)]
         return tuple(np.concatenate(parts) for parts in zip(*pieces, strict=True))

@@ -88,6 +88,25 @@ def test_what_was_searched_before_leaves_no_trace(method, then):
                     assert np.array_equal(getattr(one, key), getattr(found[name], key)), (i, name, key)
 
 
+def test_an_event_is_compiled_once_and_its_search_keeps_the_room_it_has_made():
+    level = 0.0
+    end = 4000.0  # more events than there is room for
+    event = Event(lambda q: q[1] - level, name="level")
+    made = prepared(HBVM(), KEPLER.system)
+    made.spare = spare.Spare()
+    first = integrate(KEPLER, HBVM(), end, events=event)
+    kept = made.with_events(KEPLER, named(event))
+    assert made.with_events(KEPLER, named(event)) is kept
+    again = integrate(KEPLER, HBVM(), end, events=event)
+    assert first.events["level"].t.size > 1024
+    assert np.array_equal(first.events["level"].t, again.events["level"].t)
+    level = 0.25
+    other = Event(event.g, name="level")
+    assert made.with_events(KEPLER, named(other)) is not kept
+    found = integrate(KEPLER, HBVM(), 10.0, events=other).events["level"]
+    assert np.abs(found.y[:, 1] - level).max() < 1e-14  # measured: 2e-16
+
+
 def test_a_function_that_raises_at_the_start_leaves_no_trace():
     def g(q):
         if q[0] < 0.0:
