@@ -3,24 +3,21 @@
 A trajectory that leaves its lane is searched by itself, from its start.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from integrators.events.event import Event
 from integrators.events.finder import Ending, ended_by
 from integrators.events.members import ending_of
 from integrators.kernel.batch import Adaptive, Batch, BatchProgram, Work, nothing_yet
-from integrators.kernel.context import Context
+from integrators.kernel.context import Context, Shape
 from integrators.kernel.engines import look
 from integrators.kernel.ensemble.group import ACCUMULATES, BY_EVENT
 from integrators.kernel.ensemble.prepared import Lanes
-from integrators.kernel.inside.functions import Action, EventFunction
-from integrators.kernel.inside.search import Log, room_for, search_memory
+from integrators.kernel.inside.search import Log, Sought, room_for
 from integrators.kernel.pace import FEWEST, Pace
 from integrators.kernel.stepper import CHUNK_WITH_EVENTS, HBVMStepper, accumulated
 from integrators.protocol import Samples, Status
@@ -34,6 +31,7 @@ class Program(BatchProgram, Protocol):
     """What trajectories with events ask of their program."""
 
     varying: bool
+    shape: Shape
 
     @property
     def renews(self) -> bool: ...
@@ -48,26 +46,22 @@ class WithEvents:
     ----------
     program : Program
         Of the trajectories.
-    events : mapping of str to Event
-        What is looked for.
-    functions, actions : sequence of EventFunction, mapping of str to Action
-        What is compiled of it.
+    sought : Sought
+        The events.
     """
 
     program: Program
-    events: Mapping[str, Event]
-    functions: Sequence[EventFunction]
-    actions: Mapping[str, Action]
+    sought: Sought
 
     def __call__(self, y0: ArrayLike, par: ArrayLike | None, t0: float, end: float) -> HBVMStepper:
         """Return a stepper that looks for the events up to a time."""
         stepper = self.program.start(y0, par, t0)
-        stepper.look_for(self.events, self.functions, self.actions, end)
+        stepper.look_for(self.sought, end)
         return stepper
 
     def raise_what_is_no_failure(self) -> None:
         """Raise Ctrl-C and the like if they were raised in a function of the user in this thread."""
-        for function in (*self.functions, *self.actions.values()):
+        for function in (*self.sought.functions, *self.sought.actions.values()):
             if function.error is not None and not isinstance(function.error, Exception):
                 raise function.error
 
@@ -87,7 +81,7 @@ class WithEvents:
         work = _Work(
             result=nothing_yet(grid, *starts.shape), starts=starts, parameters=parameters, t0=t0,
             sample="partial", threads=threads, program=program,
-            search=WithEvents(program, self.events, self.functions, self.actions),
+            search=WithEvents(program, replace(self.sought, shape=program.shape)),
             happened=[{} for _ in starts],
         )  # fmt: skip
         in_lanes = _Watched.planned(lanes, work)
@@ -117,7 +111,7 @@ class _Work(Work):
 
     def tell(self, lanes: "_Watched") -> None:
         """Say how the trajectories that stayed in lanes ended, and what has happened in them."""
-        result, names = self.result, list(self.search.events)
+        result, names = self.result, list(self.search.sought.events)
         stops, arrived = lanes.arrays["stops"].tolist(), lanes.arrived
         for i in np.flatnonzero(arrived >= ACCUMULATES).tolist():
             result.t_stop[i] = stops[i]
@@ -146,7 +140,7 @@ class _Watched(Adaptive):
     def plan(cls, lanes: Lanes, work: Work) -> tuple[float, dict[str, int], dict[str, Any]]:
         assert isinstance(work, _Work)
         h, counts, arrays = super().plan(lanes, work)
-        events = {"events": len(work.search.events)}
+        events = {"events": len(work.search.sought.events)}
         return h, counts | events, arrays | {"stops": np.full(len(work.starts), np.nan)}
 
     def contexts(self) -> list[tuple[Context, ...]]:
@@ -158,7 +152,7 @@ class _Watched(Adaptive):
         end, parameters = float(self.work.result.t[-1]), self.lanes.parameters
         sign = 1.0 if end >= self.work.t0 else -1.0
         group, pairs = super().memory()
-        events = search_memory(search.events, search.functions, search.actions, pairs[0])
+        events = search.sought.memory(pairs[0])
         events.last, events.sign = end, sign
         group.room = 2 * width * min(HITS, room_for(max(dim, parameters)))
         log = Log.of(events, group.room)
@@ -166,7 +160,7 @@ class _Watched(Adaptive):
         group.renews = int(self.work.program.renews)
         for context, _ in pairs:
             context.events.code, context.events.memory = look.code(), events
-            context.events.act = int(bool(search.actions))
+            context.events.act = int(bool(search.sought.actions))
         return group, pairs, events, log
 
     def advance(self, memory: Any, budget: int) -> int:
@@ -184,7 +178,7 @@ class _Watched(Adaptive):
 
     def occurrences(self) -> dict[str, list[Occurrences]]:
         """Return what has happened in every trajectory, by the events' names, in the order of integration."""
-        events, actions = self.work.search.events, self.work.search.actions
+        events, actions = self.work.search.sought.events, self.work.search.sought.actions
         n, ahead = len(self.arrived), self.work.result.t[-1] >= self.work.t0
         log = Log.joined(self.logs)
         log = log.chosen(np.lexsort((log.times if ahead else -log.times, log.members)))

@@ -19,6 +19,7 @@ from integrators.kernel.ensemble.prepared import Lanes, compiled_lanes, lanes_of
 from integrators.kernel.fixed import FixedStepper
 from integrators.kernel.implicit.workspace import SOLVERS, Workspace, linearization
 from integrators.kernel.inside.functions import Action, EventFunction
+from integrators.kernel.inside.search import Sought
 from integrators.kernel.line.kept import Kept
 from integrators.kernel.native import binary, machine
 from integrators.kernel.native.foreign import field_of
@@ -203,7 +204,7 @@ class HBVMProgram(Compiled):
         }
         look.code()
         self.compile_seconds += binary.clock() - started
-        search = WithEvents(self, events, functions, actions)
+        search = WithEvents(self, Sought(events, functions, actions, self.shape))
         if not any(function.calls_back for function in (*functions, *actions.values())):
             if len(self._searches) >= SEARCHES:
                 self._searches.pop(next(iter(self._searches)), None)

@@ -3,7 +3,7 @@
 import math
 import threading
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from time import perf_counter
@@ -12,7 +12,6 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from integrators.events.event import Event
 from integrators.kernel.adjoint.gradient import Adjoint, Records
 from integrators.kernel.context import (
     ACCUMULATE,
@@ -32,8 +31,7 @@ from integrators.kernel.context import (
 )
 from integrators.kernel.engines import solver, steps
 from integrators.kernel.implicit.workspace import Solver, Workspace, report
-from integrators.kernel.inside.functions import Action, EventFunction
-from integrators.kernel.inside.search import KernelSearch
+from integrators.kernel.inside.search import KernelSearch, Sought
 from integrators.kernel.line.kept import Kept
 from integrators.kernel.native import binary
 from integrators.kernel.native.memory import address
@@ -173,13 +171,9 @@ class HBVMStepper(ABC):
             self._take_implicit()
         self._begin(y, t0)
 
-    def look_for(
-        self, events: Mapping[str, Event], functions: Sequence[EventFunction], actions: Mapping[str, Action],
-        end: float,
-    ) -> None:  # fmt: skip
+    def look_for(self, sought: Sought, end: float) -> None:
         """Look for events in all steps from here on, up to a time."""
-        contexts = self._context, self._partial
-        self.search = KernelSearch(events, functions, actions, contexts, end)
+        self.search = KernelSearch(sought, (self._context, self._partial), end)
         self._pace = Pace(CHUNK_WITH_EVENTS, self._dim)
         self._pace.steps = FEWEST
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from integrators.events.event import Event
 from integrators.events.finder import EventLog
-from integrators.kernel.context import DONE, Context
+from integrators.kernel.context import DONE, Context, Shape
 from integrators.kernel.engines import look, steps
 from integrators.kernel.inside.functions import Action, EventFunction
 from integrators.kernel.inside.memory import (
@@ -61,31 +61,54 @@ def _tables() -> tuple[Array, tuple[Array, ...]]:
     return cosines, tuple(tables)
 
 
-def search_memory(
-    events: Mapping[str, Event], functions: Sequence[EventFunction], actions: Mapping[str, Action],
-    contexts: tuple[Context, Context],
-) -> Search:  # fmt: skip
-    """Return the memory of a search, without room for what it finds; the arguments are those of it."""
-    own, partial = contexts
-    dim, n_par = own.shape.dim, own.par.size
-    degree = 1 << (min(max(2 * own.s, LEAST), MOST) - 1).bit_length()
-    terms = own.s + 1 if own.s < LOW else own.s
-    numbers = {
-        "count": len(events), "dim": dim, "degree": degree, "chunks": degree // 8, "terms": terms,
-        "groups": -(-terms // 8), "parameters": n_par, "made_rows": 1 + dim + n_par,
-    }  # fmt: skip
-    cosines, transforms = _tables()
-    memory = Search(numbers, {"cosines": cosines})
-    if terms > own.s:
-        x, weights = np.polynomial.legendre.leggauss(NODES)
-        polynomial = np.polynomial.legendre.Legendre.basis(own.s)(x) * (2.0 * own.s + 1.0) ** 0.5
-        memory.gauss[:] = np.append((1.0 + x) / 2.0, polynomial * weights / 2.0)
-    memory.own, memory.partial, memory.steps = own, partial, steps.code()
-    memory.transforms, memory.functions = transforms, functions
-    memory.actions = [actions.get(name) for name in events]
-    memory.directions[:] = [event.direction for event in events.values()]
-    memory.limits[:] = [event.last for event in events.values()]
-    return memory
+@dataclass(frozen=True, eq=False)
+class Sought:
+    """Events that are looked for in the trajectories of a program.
+
+    Attributes
+    ----------
+    events : mapping of str to Event
+        What to look for.
+    functions : sequence of EventFunction
+        Theirs.
+    actions : mapping of str to Action
+        Of those that change the state.
+    shape : Shape
+        Of the trajectories' memory.
+    """
+
+    events: Mapping[str, Event]
+    functions: Sequence[EventFunction]
+    actions: Mapping[str, Action]
+    shape: Shape
+
+    def memory(self, contexts: tuple[Context, Context]) -> Search:
+        """Return memory for a search with these contexts, without room for what it finds."""
+        memory = self._fresh.copy()
+        memory.own, memory.partial = contexts
+        return memory
+
+    @cached_property
+    def _fresh(self) -> Search:
+        """What `memory` copies."""
+        dim, n_par, s = self.shape.dim, self.shape.parameters, self.shape.constants.s
+        degree = 1 << (min(max(2 * s, LEAST), MOST) - 1).bit_length()
+        terms = s + 1 if s < LOW else s
+        numbers = {
+            "count": len(self.events), "dim": dim, "degree": degree, "chunks": degree // 8, "terms": terms,
+            "groups": -(-terms // 8), "parameters": n_par, "made_rows": 1 + dim + n_par,
+        }  # fmt: skip
+        cosines, transforms = _tables()
+        memory = Search(numbers, {"cosines": cosines})
+        if terms > s:
+            x, weights = np.polynomial.legendre.leggauss(NODES)
+            polynomial = np.polynomial.legendre.Legendre.basis(s)(x) * (2.0 * s + 1.0) ** 0.5
+            memory.gauss[:] = np.append((1.0 + x) / 2.0, polynomial * weights / 2.0)
+        memory.steps, memory.transforms, memory.functions = steps, transforms, self.functions
+        memory.actions = [self.actions.get(name) for name in self.events]
+        memory.directions[:] = [event.direction for event in self.events.values()]
+        memory.limits[:] = [event.last for event in self.events.values()]
+        return memory
 
 
 def room_for(numbers: int) -> int:
@@ -131,12 +154,8 @@ class KernelSearch:
 
     Parameters
     ----------
-    events : mapping of str to Event
-        What to look for.
-    functions : sequence of EventFunction
-        Theirs.
-    actions : mapping of str to Action
-        Of those that change the state.
+    sought : Sought
+        The events.
     contexts : pair of Context
         Of the trajectory, and for partial steps; the solver of steps need not be there.
     end : float
@@ -148,23 +167,23 @@ class KernelSearch:
         With what a function raises at the start.
     """
 
-    def __init__(
-        self, events: Mapping[str, Event], functions: Sequence[EventFunction], actions: Mapping[str, Action],
-        contexts: tuple[Context, Context], end: float,
-    ):  # fmt: skip
-        self._functions, self._actions = functions, actions
+    def __init__(self, sought: Sought, contexts: tuple[Context, Context], end: float):
+        self._sought = sought
         self._context, _ = contexts
         self._dim, sign = self._context.shape.dim, 1.0 if end >= self._context.t0 else -1.0
-        self._memory = memory = search_memory(events, functions, actions, contexts)
+        self._memory = memory = sought.memory(contexts)
         memory.last, memory.sign = end, sign
-        self._hits = EventLog(events, memory.sign, self._dim, memory.parameters)
+        self._hits = EventLog(sought.events, memory.sign, self._dim, memory.parameters)
         self._make_room(room_for(max(self._dim, memory.parameters)))
         self.trouble: tuple[Status, str, Exception | None] | None = None
         if self._look(START) != DONE:
             error = self._error
             raise UserError(error) from error
-        self._context.events.code, self._context.events.memory = look.code(), memory
-        self._context.events.act, self._context.events.acted = int(bool(actions)), -memory.sign * np.inf
+        self._context.events.code, self._context.events.memory = look, memory
+        self._context.events.act, self._context.events.acted = (
+            int(bool(sought.actions)),
+            -memory.sign * np.inf,
+        )
 
     def _make_room(self, room: int) -> None:
         self._log = Log.of(self._memory, room)
@@ -180,9 +199,9 @@ class KernelSearch:
         """What a function has raised; Ctrl-C and the like are raised as they are."""
         raised = self._memory.raised
         if raised > 0:
-            error = self._functions[raised - 1].error
+            error = self._sought.functions[raised - 1].error
         else:
-            error = self._actions[self._hits.names[-1 - raised]].error
+            error = self._sought.actions[self._hits.names[-1 - raised]].error
         if isinstance(error, Exception):
             return error
         assert error is not None
@@ -229,9 +248,10 @@ class KernelSearch:
     @property
     def hits(self) -> EventLog:
         """What has happened."""
-        n, self._memory.hits = self._memory.hits, 0
-        log = self._log.chosen(slice(n))
-        self._hits.take(log.times, log.states, log.after, log.events, log.directions, log.par)
+        if n := self._memory.hits:
+            log = self._log.chosen(slice(n))
+            self._hits.take(log.times, log.states, log.after, log.events, log.directions, log.par)
+            self._memory.hits = 0
         return self._hits
 
     def resume(self, counts: Sequence[int], directions: Sequence[int], *, again: bool) -> None:

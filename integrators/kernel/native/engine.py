@@ -50,6 +50,15 @@ class Engine:
 
         return binary.obtain(self.key, make)
 
+    @cached_property
+    def _loaded(self) -> binary.Native:
+        return self.code()
+
+    @property
+    def address(self) -> int:
+        """Where the machine code is, for other code that calls it."""
+        return self._loaded.address
+
     def for_levels(self) -> dict[str, bytes]:
         """Return machine code for each of `machine.levels`; see `integrators.kernel.native.shipped`."""
         text = binary.lower(*self._compiled())
@@ -70,7 +79,7 @@ class Engine:
     def _function(self) -> Any:
         # Integers pass as addresses in half the time that they take as c_int64; negative ones too.
         kinds = [ctypes.c_void_p] * len(self._arguments)
-        return ctypes.CFUNCTYPE(ctypes.c_int64, *kinds)(self.code().address)
+        return ctypes.CFUNCTYPE(ctypes.c_int64, *kinds)(self.address)
 
     def __call__(self, *arguments: int | Memory, **named: int | Memory) -> int:
         """Call it with numbers, and with memories by their addresses; missing arguments are 0.

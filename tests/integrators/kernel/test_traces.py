@@ -1,6 +1,7 @@
 """What a program has integrated before leaves no trace in what it integrates next."""
 
 import threading
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from hypothesis import strategies as st
 import problems
 from integrators import HBVM, Event, Gauss, LineIntegral, integrate, integrate_many
 from integrators.events.event import named
+from integrators.running.integrate import prepared
 
 KEPLER = problems.load("kepler")
 STIFF = problems.Problem(
@@ -88,12 +90,11 @@ def test_what_was_searched_before_leaves_no_trace(method, then):
                     assert np.array_equal(getattr(one, key), getattr(found[name], key)), (i, name, key)
 
 
-def test_an_event_is_compiled_once_and_its_search_keeps_the_room_it_has_made():
+def test_an_event_is_compiled_once_and_its_search_has_room_for_all():
     level = 0.0
     end = 4000.0  # more events than there is room for
     event = Event(lambda q: q[1] - level, name="level")
-    made = prepared(HBVM(), KEPLER.system)
-    made.spare = spare.Spare()
+    made: Any = prepared(HBVM(), KEPLER.system)[0]
     first = integrate(KEPLER, HBVM(), end, events=event)
     kept = made.with_events(KEPLER, named(event))
     assert made.with_events(KEPLER, named(event)) is kept
