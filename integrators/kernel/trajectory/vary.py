@@ -18,15 +18,14 @@ from integrators.kernel.context import (
     UNSCALED,
     UNSOLVED,
 )
-from integrators.kernel.inside.discontinuities import has_discontinuity, keep_end, record, undo
-from integrators.kernel.inside.filippov import slides
-from integrators.kernel.inside.graze import grazes
-from integrators.kernel.inside.surfaces import AGAIN, REACHED, leave, locate, look_across
+from integrators.kernel.inside.attempt import CONFIRMATIONS, GOOD, TOO_LONG, enter, judge_attempt
+from integrators.kernel.inside.discontinuities import keep_end, record, undo
+from integrators.kernel.inside.surfaces import AGAIN, REACHED
 from integrators.kernel.native.jit import compiled
-from integrators.kernel.parts.discontinuities import NOTHING, START
+from integrators.kernel.parts.discontinuities import START
 from integrators.kernel.parts.estimate import TOO_NOISY
 from integrators.kernel.parts.implicit import FIXED_POINT
-from integrators.kernel.parts.surfaces import AT_STEP_END, END_ACROSS, NO_SURFACE
+from integrators.kernel.parts.surfaces import AT_STEP_END
 from integrators.kernel.simd.operations import binary_log, least
 from integrators.kernel.step.begin import INFINITY, begin, set_step, tabulated_ratio
 from integrators.kernel.step.control import (
@@ -43,15 +42,12 @@ from integrators.kernel.step.control import (
     bounded,
     error_power,
     is_distinct,
-    is_good,
     log_of_order,
     log_ratio,
     room_for_longer,
 )
 from integrators.kernel.step.estimate import (
-    estimate,
     estimate_again,
-    estimate_implicit,
     log_decay,
 )
 from integrators.kernel.step.finish import count_step, finish
@@ -90,9 +86,6 @@ LIMITED_GROWTH = 1.2
 GAIN, GAIN_LIGHT, GAIN_PER_ROW, MOST_ROWS = 3.0, 6.0, 0.1, 64
 LEAST_WORTH = log(GAIN)  # `log_worth` is larger; no logarithm is taken where this tells enough
 MOST_LIMITED_STEPS = 4096  # twice as many each time that it has gained nothing
-# A step that is too long may fail, or look like one with a discontinuity; so many in a row have one, and are
-# cut to find it.
-CONFIRMATIONS = 3
 LEAST_IMPLICIT_STEPS = 16  # steps for which it then stays
 # Attempts at a step after which its errors do not become small enough by cutting it; at a discontinuity they
 # do.
@@ -302,12 +295,8 @@ def attempt_on(ctx):
     controller = ctx.controller
     failure = UNDERFLOW
     while True:
-        # Its first stages are on one side only if they are beyond the surface; what follows from the state
-        # alone may be on either.
-        if ctx.surfaces.on_surface and ctx.length == 0.0:
-            if ctx.surfaces.locating + controller.attempts == 0 and slides(ctx):
-                return SLIDING
-            leave(ctx)
+        if enter(ctx) != DONE:
+            return SLIDING
         h = within(ctx, controller.next_length)
         too_short = not is_distinct(h, ctx.t0)
         if (
@@ -410,65 +399,28 @@ def accepts(ctx, outcome, iterations, implicit):
     If it is, `Controller.length_after` is the length of the step after it; else `Controller.next_length`
     is that of the next attempt.
     """
-    controller, surfaces = ctx.controller, ctx.surfaces
-    error, quadrature_error = estimate_attempt(ctx, outcome, implicit)
-    most_growth = MOST_GROWTH if controller.attempts == 0 else 1.0
-    factor, in_doubt = length_factor(ctx, error, quadrature_error, most_growth, implicit)
-    if outcome == DONE and ctx.estimate.constant_field and abs(ctx.h) > controller.longest_constant:
+    controller = ctx.controller
+    error, quadrature_error, verdict = judge_attempt(ctx, outcome, implicit)
+    if verdict == TOO_LONG:
         reject(ctx, outcome, controller.longest_constant / abs(ctx.h), implicit)
         return False
-    good = is_good(error, controller.allowed_error, quadrature_error, controller.allowed_quadrature_error)
-    if good and in_doubt:
+    if verdict == AGAIN:
+        retry(ctx, outcome, implicit)
+        return False
+    most_growth = MOST_GROWTH if controller.attempts == 0 else 1.0
+    factor, in_doubt = length_factor(ctx, error, quadrature_error, most_growth, implicit)
+    if verdict not in (GOOD, REACHED):
+        reject(ctx, outcome, factor, implicit)
+        return False
+    if in_doubt:
         # A trend of noise would go on for ever: its coefficients do not fall with the length.
         error, quadrature_error = estimate_again(ctx, error, quadrature_error, implicit)
         factor, _ = length_factor(ctx, error, quadrature_error, most_growth, implicit)
-    if surfaces.code and (surfaces.locating or (surfaces.across != NO_SURFACE and not good)):
-        verdict = locate(ctx, outcome, good)
-        if verdict == AGAIN:
-            retry(ctx, outcome, implicit)
-            return False
-        if verdict == REACHED:
-            end_on_surface(ctx, factor, iterations, implicit)
-            return True
-        surfaces.locating = 0
-        if surfaces.across != NO_SURFACE:
-            record(ctx, ctx.t0, ctx.h)
-            good = False
-    if not good:
-        reject(ctx, outcome, factor, implicit)
-        return False
-    set_next_length(ctx, factor, iterations, implicit)
-    return True
-
-
-@compiled
-def estimate_attempt(ctx, outcome, implicit):
-    """Return the estimated errors of the attempted step; infinite: it failed, or is not smooth."""
-    discontinuities, surfaces = ctx.discontinuities, ctx.surfaces
-    discontinuities.undone = 0
-    across = look_across(ctx, outcome) if surfaces.code else NO_SURFACE
-    if outcome != DONE:
-        return INFINITY, INFINITY
-    surfaces.crossed = 1 if across >= 0 or (across == END_ACROSS and surfaces.locating == 0) else 0
-    error, quadrature_error = estimate_implicit(ctx) if implicit else estimate(ctx)
-    fits = is_good(
-        error, ctx.controller.allowed_error, quadrature_error, ctx.controller.allowed_quadrature_error
-    )
-    if implicit:
-        if surfaces.crossed and (discontinuities.not_smooth or fits) and has_discontinuity(ctx, fits):
-            error = INFINITY
-        discontinuities.next_boundary = NOTHING
-        discontinuities.undone = 0
+    if verdict == REACHED:
+        end_on_surface(ctx, factor, iterations, implicit)
     else:
-        if discontinuities.not_smooth:
-            discontinuities.doubts += 1
-            discontinuities.doubt_end = ctx.t0 + ctx.h
-        if (fits or discontinuities.doubts >= CONFIRMATIONS) and has_discontinuity(ctx, fits):
-            error = INFINITY
-    if surfaces.count and fits and error < INFINITY and across == NO_SURFACE and grazes(ctx):
-        record(ctx, ctx.t0, ctx.h)
-        error = INFINITY
-    return error, quadrature_error
+        set_next_length(ctx, factor, iterations, implicit)
+    return True
 
 
 @compiled
