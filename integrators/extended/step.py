@@ -1,4 +1,9 @@
-"""A step of Gauss collocation in double-double arithmetic, by fixed-point iteration."""
+"""A step of Gauss collocation in double-double arithmetic, by fixed-point iteration.
+
+The kernel's stages are doubles, and the numbers that end its iteration are those of doubles. Here the
+stage equations, the tables and the field are evaluated in pairs of doubles, so that they have code and
+numbers of their own.
+"""
 
 from functools import cache
 from typing import Any

@@ -30,6 +30,19 @@ def error_order(degree):  # compiled too
     return 2.0 * degree + 1.0
 
 
+def left_out(part, gamma, mean):  # compiled too
+    """Return ``part (gamma / mean)``: with h and for part = gamma, the estimated error of a step.
+
+    Parameters
+    ----------
+    part : float or array
+        gamma, or components of it.
+    gamma, mean : float
+        Sizes of the coefficient that is left out, and of the field, in the same norm.
+    """
+    return part * (gamma / mean)
+
+
 def aim(tol: float, degree: int) -> float:
     """Return what steps aim at: the logarithm of the tolerance divided by the order, and of `MARGIN`."""
     return log(tol) / error_order(degree) + log(MARGIN)

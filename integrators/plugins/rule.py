@@ -4,7 +4,7 @@ They are the kernel's own where it has them (`integrators.kernel.step.rule`, whi
 measured by).
 """
 
-from integrators.kernel.step.rule import FARTHEST, FLOOR, ROUNDING, STAGNATION, STAGNATION_LIMIT
+from integrators.kernel.step.rule import FARTHEST, FLOOR, STAGNATION, STAGNATION_LIMIT, is_rounding
 from integrators.kernel.step.rule import MOST_ITERATIONS as MAX_ITERATIONS
 from integrators.kernel.step.rule import TOLERANCE as CONVERGED
 
@@ -14,9 +14,9 @@ __all__ = [
     "FLOOR",
     "MAX_ITERATIONS",
     "MODES",
-    "ROUNDING",
     "STAGNATION",
     "STAGNATION_LIMIT",
+    "is_rounding",
 ]
 
 MODES = 13  # extrapolated, as `integrators.kernel.tables` at fixed steps: P_j(2) grows like 5.8^j

@@ -2,6 +2,7 @@
 
 from math import log
 
+from integrators.kernel import tolerance
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.parts.estimate import (
     AFTER_MIDDLE,
@@ -52,6 +53,8 @@ NOT_DECAYING, AT_REST = 0.1, 0.1
 DECAYED = 2.0**-6  # part of the size it had that a block has then
 # Part of the field's mean that its other coefficients are at most where it does not change
 EQUAL_VALUES = 1e-14
+
+left_out = compiled(tolerance.left_out)
 
 
 @compiled
@@ -183,7 +186,8 @@ def size_in_step(scale, largest):
 @compiled
 def local_error(h, gamma, slope, scale):
     """Return ``h gamma^2 / (slope scale)``, the error of a coefficient that is left out; see `estimate`."""
-    error = (gamma * (gamma / slope)) * (h / scale)  # not h / slope, which has no double in a field near 0
+    # not h / slope, which has no double in a field near 0
+    error = left_out(gamma, gamma, slope) * (h / scale)
     return where(error >= 0.0, error, INFINITY)  # of infinite coefficients, a NaN
 
 

@@ -1,6 +1,7 @@
 """The numbers of the rules: what ends the fixed-point iteration, sizes of blocks, parts of the interval.
 
-`integrators.kernel.step.stopping` has the rule of the iteration.
+`integrators.kernel.step.stopping` has the rule of the iteration, of which `is_rounding` is the part that all
+iterations share: the implicit solver's, and those of the plugins too.
 """
 
 from math import log2
@@ -20,6 +21,18 @@ STAGNATION = 1e-13  # above it, a change that stops decreasing is a failure
 # far from normal the changes fall in waves: two end it early (a drift of 2.4e-16 per step, period annulus,
 # s = 2, h = 1; with five 3e-18).
 STAGNATION_LIMIT = 5
+
+
+def is_rounding(change, repeated, most):  # compiled too
+    """Whether rounding accounts for a change that does not decrease; ``repeated``: not for the first time.
+
+    Then it may be as large as ``most``.
+
+    The change is relative to the size of its block, small blocks raised to a part of the largest.
+    """
+    return (change < ROUNDING) | (repeated & (change < most))
+
+
 # Once a change is small, the rate at which it has decreased tells that of what follows, if it is fast. One
 # fast decrease may be a part of a wave (Penning trap, s = 2, h = .2: an error of 5e-15 in one step); so the
 # average rate, from a first change as large as the state to 1e-15, must promise next to nothing.

@@ -7,6 +7,7 @@ from math import log2
 
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.operations import binary_log, greatest, least, where
+from integrators.kernel.step import rule
 from integrators.kernel.step.rule import (
     FAST_RATE,
     LEAST,
@@ -28,6 +29,8 @@ MOST_UNTESTED = 12.0  # iterations in a row without a test before it, at most
 LEAST_RATE, MOST_RATE = log2(1e-4), log2(0.9)
 LOG_RATE_AT_ZERO = log2(0.7)  # to the logarithm of the contraction, where the last change was nothing
 MOST_TIMES, TRIAL = 3.0, 4.0  # times as many iterations as aimed at are too many, if a trial says so
+
+is_rounding = compiled(rule.is_rounding)
 
 
 @compiled
@@ -127,17 +130,6 @@ def rate_at_zero(rate):
 def takes_too_long(change, rate, tries, log_residual, target):
     """Whether a shorter step is cheaper than to iterate on, after a trial; ``target``: so many iterations."""
     return (tries >= TRIAL) & (tries + (log_residual - change) / rate > MOST_TIMES * target)
-
-
-@compiled
-def is_rounding(change, repeated, most):
-    """Whether rounding accounts for a change that does not decrease; ``repeated``: not for the first time.
-
-    Then it may be as large as ``most``.
-
-    The change is relative to the size of its block, small blocks raised to a part of the largest.
-    """
-    return change < where(repeated, most, ROUNDING)
 
 
 @compiled

@@ -21,7 +21,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from integrators.coefficients.legendre import polynomials, tables
-from integrators.kernel.tolerance import error_order
+from integrators.kernel.tolerance import error_order, left_out
 from integrators.options import Stages
 from integrators.peers import load
 from problems.checks import checked
@@ -154,7 +154,7 @@ class _LineIntegral(dx.AbstractImplicitSolver[_Carried], dx.AbstractAdaptiveSolv
             size = jnp.abs(y) + jnp.max(jnp.abs(g), axis=0)
             size = jnp.maximum(size, FLOOR * jnp.max(size) + jnp.finfo(size.dtype).tiny)
             top, bottom = (jnp.sqrt(jnp.sum((jnp.abs(x) / size) ** 2)) for x in (b, g[0]))
-            return jnp.abs(b) * (top / jnp.where(bottom == 0.0, 1.0, bottom))
+            return left_out(jnp.abs(b), top, jnp.where(bottom == 0.0, 1.0, bottom))
 
         return jax.lax.stop_gradient(jax.tree.map(estimate, y0, G, beyond))
 

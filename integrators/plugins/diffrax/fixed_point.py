@@ -1,5 +1,8 @@
 """A fixed-point iteration that goes on to round-off, as an optimistix root finder.
 
+JAX traces and differentiates it, on any device and in either precision, which the kernel's machine code
+cannot be. The rule of what counts as rounding is the kernel's, with changes in units of the precision's.
+
 Imported only once optimistix is known to be installed.
 """
 
@@ -12,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
 
-from integrators.plugins.rule import CONVERGED, FLOOR, ROUNDING, STAGNATION, STAGNATION_LIMIT
+from integrators.plugins.rule import CONVERGED, FLOOR, STAGNATION, STAGNATION_LIMIT, is_rounding
 
 HOPELESS = 8  # changes that are no new smallest one, above STAGNATION, after which the iteration has failed
 EPSILON = float(np.finfo(np.float64).eps)  # changes are in units of the precision's: single has the same rule
@@ -81,8 +84,8 @@ class FixedPoint(optx.AbstractRootFinder):
         self, fn: Any, y: Any, args: Any, options: dict[str, Any], state: _State, tags: Any
     ) -> tuple[jax.Array, Any]:
         """Return whether to stop, and how it went."""
-        stagnation_limit = jnp.where(state.best < ROUNDING / EPSILON, 1, STAGNATION_LIMIT)
-        stagnates = (state.stalled >= stagnation_limit) & (state.best < STAGNATION / EPSILON)
+        repeated = state.stalled >= STAGNATION_LIMIT
+        stagnates = (state.stalled > 0) & is_rounding(state.best * EPSILON, repeated, STAGNATION)
         done = (state.strict <= CONVERGED / EPSILON) | stagnates
         result = optx.RESULTS.where(state.lost, optx.RESULTS.nonlinear_divergence, optx.RESULTS.successful)
         return done | state.lost, result

@@ -9,6 +9,11 @@ The equations are those of the second-order form,
 and velocities ``V_l = v + h sum_m A_lm a_m`` where forces depend on them. Nodes and
 weights come as hi + lo pairs, displacements are formed before the position is
 added, and positions and velocities carry along what their last addition rounded off.
+
+The kernel's own steps cannot be used: REBOUND evaluates the forces of one stage at a time, at positions,
+velocities and a time that lie in its particles, and may add or remove bodies between two steps. The order of
+the error, the error that is estimated and what ends the iteration are the kernel's
+(`integrators.kernel.tolerance`, `integrators.plugins.rule`).
 """
 
 import numpy as np
@@ -37,9 +42,9 @@ from integrators.plugins.rule import (
     FLOOR,
     MAX_ITERATIONS,
     MODES,
-    ROUNDING,
     STAGNATION,
     STAGNATION_LIMIT,
+    is_rounding,
 )
 
 SECOND_ORDER = 30.0  # times the error allowed: of 20 steps a circle, each has one of 3e-3 of the velocity
@@ -58,7 +63,8 @@ VECTORS = 6
 BASE, NEW, OLD, FAST = range(4)
 SUM, Q, V = range(3)
 
-error_order = compiled(tolerance.error_order)
+error_order, left_out = compiled(tolerance.error_order), compiled(tolerance.left_out)
+ends_in_rounding = compiled(is_rounding)
 
 # Functions of REBOUND, and one of ours, that compiled code calls.
 _update = types.ExternalFunction("hbvm_rebound_update_acceleration", types.void(types.int64))
@@ -235,7 +241,7 @@ def iterate(simulation, state, table, t, h, q, v, rest, forces, work):
             best, stalled = strict, 0
         else:
             stalled += 1
-            if floored < (ROUNDING if stalled < STAGNATION_LIMIT else STAGNATION):
+            if ends_in_rounding(floored, stalled >= STAGNATION_LIMIT, STAGNATION):
                 return True
     return False
 
@@ -290,9 +296,10 @@ def local_error(h, v, s, projection, forces, means, lasts, count):
             before += apart * apart
             after += (apart + h * pulled) * (apart + h * pulled)
         size = max(size, before, after, h * h * mean)
-        if square > 0.0 and square * (square / max(mean, square)) > worst:
-            worst = square * (square / max(mean, square))
-            fall = np.sqrt(square / max(mean, square))
+        largest = max(mean, square)
+        if square > 0.0 and left_out(square, square, largest) > worst:  # of squares
+            worst = left_out(square, square, largest)
+            fall = np.sqrt(square / largest)
     if worst == 0.0:
         return 0.0
     beyond = 1.0 if known == s else fall ** (2.0 * (s - known) / known)

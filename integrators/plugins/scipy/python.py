@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.integrate import DenseOutput, OdeSolver
 
 from integrators.coefficients.legendre import legendre_integrals
-from integrators.kernel.tolerance import degree_of_error, error_order
+from integrators.kernel.tolerance import degree_of_error, error_order, left_out
 from integrators.plugins.scipy.newton import Newton
 from integrators.plugins.scipy.stages import Solved, Stages
 
@@ -252,7 +252,7 @@ class PythonSteps:
         largest = np.maximum(np.abs(y), np.abs(y + solved.G[0]))
         scale = self._solver.atol + largest * self._solver.rtol
         top, bottom = norm(last / scale), norm(solved.G[0] / scale)
-        return 0.0 if top == 0.0 else float(np.divide(top * top, bottom))
+        return 0.0 if top == 0.0 else float(left_out(top, top, np.float64(bottom)))
 
     def _unseen(self, solved: Solved) -> float:
         """Return how much of the field k nodes do not see: up to 1, the energy is conserved to round-off.

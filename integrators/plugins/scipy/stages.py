@@ -1,7 +1,9 @@
 """The stage equations of HBVM(k, s) for a function in Python, solved to round-off.
 
 The unknowns are ``G_j = h gamma_j``, shape (s, n), real or complex, with the stages
-``Y = y + (e + I G)`` and the equations ``G = h P' Omega f(t + c h, Y)``.
+``Y = y + (e + I G)`` and the equations ``G = h P' Omega f(t + c h, Y)``. They are solved here for states
+that may be complex, and with the user's Jacobian; see `integrators.plugins.scipy.python` for what the kernel
+would take. What counts as rounding is the kernel's rule.
 """
 
 from collections.abc import Callable
@@ -19,9 +21,9 @@ from integrators.plugins.rule import (
     FLOOR,
     MAX_ITERATIONS,
     MODES,
-    ROUNDING,
     STAGNATION,
     STAGNATION_LIMIT,
+    is_rounding,
 )
 
 HOPELESS = 4  # changes that are no new smallest one, above STAGNATION, after which the iteration has failed
@@ -147,7 +149,7 @@ class Stages:
             else:
                 stalled += 1
             if best < STAGNATION:
-                if stalled and (best < ROUNDING or stalled >= STAGNATION_LIMIT):
+                if stalled and is_rounding(best, stalled >= STAGNATION_LIMIT, STAGNATION):
                     return Solved(G, values, True, rate)
             elif stalled >= HOPELESS or iteration + 1 == most:
                 return Solved(G, values, False, np.inf)
