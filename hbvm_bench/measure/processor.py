@@ -58,7 +58,7 @@ def _compiled(text: str) -> Any:
     target = llvm.Target.from_triple(llvm.get_process_triple()).create_target_machine(
         cpu=llvm.get_host_cpu_name(), features=llvm.get_host_cpu_features().flatten(), opt=2, jit=True
     )
-    address = machine.load(machine.object_file(target, llvm.parse_assembly(text)))
+    address = machine.load(target.emit_object(llvm.parse_assembly(text)))
     return ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64)(address)
 
 

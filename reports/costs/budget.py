@@ -15,13 +15,12 @@ from time import perf_counter
 import numpy as np
 
 import problems
-from integrators.kernel.native import machine
-from integrators.kernel.native.field import assembly
+from integrators.kernel.native import binary, machine, stages
 from integrators.kernel.plan import Plan
 from integrators.kernel.program import HBVMProgram
 from integrators.kernel.routes import WIDE
 from problems import targets
-from problems.problem import Problem
+from problems.problem import Problem, System
 
 NAMES = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
 STEPS, ROUNDS = 2000, 15
@@ -130,6 +129,15 @@ def _say(problem: Problem, k: int, s: int, h: float) -> None:
     cost = measure(problem, k, s, h)
     print(f"  measured {cost.iteration:.1f} ns per iteration, {cost.iterations:.1f} iterations per step,")
     print(f"           {cost.step:.0f} ns per step besides ({machine.processor()})")
+
+
+def assembly(system: System, quantity: str, lanes: int) -> str:
+    """Return the machine code of a function of a system that runs on lanes, as text."""
+    function, arguments = stages.on_lanes(targets.numba(system, quantity).py_func, lanes)
+    with machine.alone():
+        module = binary.linked(function, arguments, "void")
+        machine.optimized(module)
+        return machine.target_machine().emit_assembly(module)
 
 
 def main() -> None:

@@ -3,7 +3,6 @@
 import pytest
 
 import problems
-from integrators.kernel.native.field import assembly
 from problems import targets
 from tests.hbvm_bench.study_folders import module
 
@@ -33,7 +32,7 @@ def test_the_pairs_of_six_bodies_have_a_division_and_a_square_root_each():
 
 def test_the_machine_code_of_a_field_takes_all_its_roots_at_once():
     system = problems.load("kepler").system
-    text = assembly(system, "force", 8)
+    text = budget.assembly(system, "force", 8)
     assert "hbvm_entry" in text
     assert 1 <= text.count("sqrtpd") <= 4  # one instruction for 8, 4 or 2 lanes
     assert "sqrtsd" not in text

@@ -172,29 +172,22 @@ def build(
         If it cannot be compiled for these types.
     """
     with machine.alone():
-        return machine.optimized(_linked(function, arguments, returns, around), machine.object_file)
+        return machine.optimized(linked(function, arguments, returns, around))
 
 
 def lower(function: Any, arguments: Sequence[tuple[Any, str]], returns: str = "void") -> str:
     """Return what `build` makes machine code of as LLVM's text, simplified, the same for all processors."""
     with machine.alone():
-        return str(machine.simplified(_linked(function, arguments, returns)))
+        return str(machine.simplified(linked(function, arguments, returns)))
 
 
 def build_for(level: str, text: str) -> bytes:
     """Return an object file of what `lower` returned, for one of `machine.LEVELS`, with `build`'s results."""
     with machine.alone():
-        return machine.optimized(llvm.parse_assembly(text), machine.object_file, level)
+        return machine.optimized(llvm.parse_assembly(text), level)
 
 
-def assembly(function: Any, arguments: Sequence[tuple[Any, str]], returns: str = "void") -> str:
-    """Return the machine code that `build` makes, as text."""
-    with machine.alone():
-        linked = _linked(function, arguments, returns)
-        return machine.optimized(linked, lambda machine, module: machine.emit_assembly(module))
-
-
-def _linked(
+def linked(
     function: Any,
     arguments: Sequence[tuple[Any, str]],
     returns: str,

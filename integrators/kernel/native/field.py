@@ -33,14 +33,3 @@ def compile_field(system: System, quantity: targets.Quantity, lanes: int) -> bin
     source = targets.source(system, quantity, "numba")
     name = store.key("field", source.text, str(lanes), binary.sources(BUILT_BY))
     return binary.obtain(name, lambda: stages.build(targets.numba(system, quantity).py_func, lanes))
-
-
-def assembly(system: System, quantity: targets.Quantity, lanes: int) -> str:
-    """Return the machine code of a field, as text; the arguments are those of `compile_field`.
-
-    Raises
-    ------
-    numba.NumbaError
-        If it cannot be compiled.
-    """
-    return stages.assembly(targets.numba(system, quantity).py_func, lanes)

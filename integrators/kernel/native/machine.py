@@ -8,7 +8,7 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import lru_cache
-from typing import Any, TypeVar
+from typing import Any
 
 import llvmlite.binding as llvm
 
@@ -24,8 +24,6 @@ LEVELS: dict[str, dict[str, frozenset[str]]] = {
 }
 """Processors that code is shipped for, the best ones first: LLVM's names, and the features that tell them."""
 
-Result = TypeVar("Result", bytes, str)
-
 lock = threading.RLock()
 """Held while code is compiled or loaded, and during a fork, which waits for that: LLVM's and numba's own
 locks would stay locked for ever in the child, where the thread that holds them does not exist."""
@@ -37,7 +35,7 @@ _engines: list[Any] = []  # an engine owns its code: none may be collected
 def emitted(lowered: tuple[Any, str], arguments: Sequence[tuple[Any, str]], returns: str) -> bytes:
     """Return the object file of what `jit.module` has returned; the rest as for `build`."""
     with alone():
-        return optimized(entered(lowered, arguments, returns), object_file)
+        return optimized(entered(lowered, arguments, returns))
 
 
 def entered(
@@ -56,13 +54,13 @@ def entered(
     return module
 
 
-def optimized(module: Any, emit: Callable[[Any, Any], Result], level: str | None = None) -> Result:
-    """Return what is emitted of a module that is optimized for this processor, or for one of `LEVELS`."""
-    machine = _machine(level)
+def optimized(module: Any, level: str | None = None) -> bytes:
+    """Optimize a module for this processor, or for one of `LEVELS`, and return its object file."""
+    machine = target_machine(level)
     options = llvm.create_pipeline_tuning_options(speed_level=3)
     builder = llvm.create_pass_builder(machine, options)
     builder.getModulePassManager().run(module, builder)
-    return emit(machine, module)
+    return machine.emit_object(module)
 
 
 def simplified(module: Any) -> Any:
@@ -77,11 +75,6 @@ def simplified(module: Any) -> Any:
     builder = llvm.create_pass_builder(target.create_target_machine(cpu="generic", opt=2), options)
     builder.getModulePassManager().run(module, builder)
     return module
-
-
-def object_file(machine: Any, module: Any) -> bytes:
-    """Return a module as an object file."""
-    return machine.emit_object(module)
 
 
 @contextmanager
@@ -133,7 +126,7 @@ def load(code: bytes) -> int:
     with lock:
         _initialize()
         if hasattr(llvm, "create_mcjit_compiler"):
-            engine: Any = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine())
+            engine: Any = llvm.create_mcjit_compiler(llvm.parse_assembly(""), target_machine())
             engine.add_object_file(llvm.ObjectFileRef.from_data(code))
             engine.finalize_object()
             _engines.append(engine)
@@ -156,7 +149,8 @@ def _initialize() -> None:
         llvm.load_library_permanently(library)
 
 
-def _machine(level: str | None = None) -> Any:
+def target_machine(level: str | None = None) -> Any:
+    """Return LLVM's description of this processor, or of one of `LEVELS`, for which code is optimized."""
     _initialize()
     return llvm.Target.from_triple(llvm.get_process_triple()).create_target_machine(
         cpu=level or processor(),

@@ -24,22 +24,6 @@ def build(function: Any, lanes: int) -> tuple[str, bytes]:
         return ONE_BY_ONE, build_one_by_one(function, lanes)
 
 
-def assembly(function: Any, lanes: int) -> str:
-    """Return the machine code that `build` makes, as text.
-
-    Raises
-    ------
-    numba.NumbaError
-        If it cannot be compiled.
-    """
-    from numba import NumbaError
-
-    try:
-        return binary.assembly(*on_lanes(function, lanes))
-    except NumbaError:
-        return binary.assembly(*_one_by_one(function, lanes))
-
-
 def build_on_lanes(function: Any, lanes: int) -> bytes:
     """Compile ``function(t, y, par, out)`` with t and y[i] as lanes."""
     return binary.build(*on_lanes(function, lanes))

@@ -24,8 +24,9 @@ def optimized(text):
     function, arguments = stages.on_lanes(targets.numba(system, "force").py_func, 8, par=True)
     linked = partial(lanes._linked, [kind for _, kind in arguments], text, constants)
     with machine.alone():
-        module = binary._linked(function, arguments, "void", linked)
-        return machine.optimized(module, lambda _, module: str(module))
+        module = binary.linked(function, arguments, "void", linked)
+        machine.optimized(module)
+        return str(module)
 
 
 def test_all_loops_over_numbers_are_unrolled_and_llvm_warns_of_none(capfd):

@@ -119,7 +119,7 @@ import ctypes
 import llvmlite.binding as llvm
 text = "define i64 @hbvm_entry(i64 %x) { %y = mul i64 %x, 3 ret i64 %y }"
 for _ in range(2):  # two of the same name
-    address = machine.load(machine._machine().emit_object(llvm.parse_assembly(text)))
+    address = machine.load(machine.target_machine().emit_object(llvm.parse_assembly(text)))
     print(ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)(address)(14))
 """
     done = run(tmp_path, WITHOUT_MCJIT + code)
