@@ -38,27 +38,26 @@ by `offers`; without it the method still integrates. The conformance kit checks 
     `integrate` reaches in pieces. The vector field is not evaluated beyond it: the last step is shortened.
     Whether steps have collapsed is judged by the way to it, see `integrators.running.watchdog`.
 12. `KeptError`: after ``USER_ERROR``, ``error`` is the exception raised by a user function.
-13. `Events`: ``with_events`` of a program starts steppers that search their steps for events. Such an
-    `EventStepper` has the ``search``, and ``look_to``, which searches the next step up to the last time.
+13. `Events`: ``with_events`` of a program starts steppers that search their steps for events. Such a
+    stepper has the ``search``, and ``look_to``, which searches the next step up to the last time.
     `Actions`: with ``acts`` these events may change the state and the parameters. `BatchesEvents`: what
     ``with_events`` returns can ``find_in_batch`` the events of many trajectories, if it
     ``goes_in_batches``.
 14. `Interruptible`: another thread sets ``stop`` of a stepper to interrupt ``advance``. Many trajectories
-    with events are integrated in several threads.
+    with events are integrated in several threads. After ``time_limit`` seconds ``advance`` returns the
+    samples that it has computed, so that `integrate` can request all of them at once and Ctrl-C loses few.
 15. `Batches`: ``batch`` of a program integrates many initial conditions faster than one after another, for
     `integrate_many`. `PreparedBatches`: ``prepare_batch`` does everything except the integration, which the
     benchmark can then time separately. `Threads`: with ``threaded`` it takes ``threads=``. `PieceSize`:
     ``piece`` is the recommended number of trajectories of the first call.
-16. `TimeLimit`: after ``time_limit`` seconds ``advance`` returns the samples that it has computed, so that
-    `integrate` can request all of them at once and Ctrl-C loses few.
-17. `Variations`: ``follow`` of a stepper propagates tangent vectors; ``variations`` are the vectors at the
+16. `Variations`: ``follow`` of a stepper propagates tangent vectors; ``variations`` are the vectors at the
     samples of the last ``advance``. `BatchesAlong`: ``batch_along`` of a program integrates many initial
     conditions with tangent vectors, if it ``goes_along`` with so many.
-18. `Gradients`: a stepper can ``record`` its steps, and ``adjoint`` integrates the adjoint equations over
+17. `Gradients`: a stepper can ``record`` its steps, and ``adjoint`` integrates the adjoint equations over
     them backwards. `integrators.gradient` needs this and `Checkpoints`.
-19. `DoubleDouble`: ``start_pairs`` of a program starts from states with twice the digits of a double;
-    ``low`` of such a `LowParts` stepper has the low parts of the samples.
-20. `AsHBVM`: ``as_hbvm`` of a method returns the HBVM(k, s) that it is identical to; `integrators.order_of`
+18. `DoubleDouble`: ``start_pairs`` of a program starts from states with twice the digits of a double;
+    ``low`` of such a stepper has the low parts of the samples.
+19. `AsHBVM`: ``as_hbvm`` of a method returns the HBVM(k, s) that it is identical to; `integrators.order_of`
     and the plugins use its coefficients.
 """
 
@@ -73,16 +72,13 @@ from integrators.protocol.capabilities import (  # noqa: F401 -- some are for th
     Destination,
     DoubleDouble,
     Events,
-    EventStepper,
     Gradients,
     Interruptible,
     KeptError,
-    LowParts,
     PieceSize,
     PreparedBatches,
     Samplings,
     Threads,
-    TimeLimit,
     Variations,
     members,
     offers,
@@ -117,12 +113,10 @@ __all__ = [
     "Checkpoints",
     "Destination",
     "DoubleDouble",
-    "EventStepper",
     "Events",
     "Gradients",
     "Interruptible",
     "KeptError",
-    "LowParts",
     "MethodBase",
     "PieceSize",
     "PreparedBatches",
@@ -133,7 +127,6 @@ __all__ = [
     "Status",
     "Stepper",
     "Threads",
-    "TimeLimit",
     "Trajectories",
     "UserError",
     "offers",

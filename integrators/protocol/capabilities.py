@@ -9,7 +9,7 @@ from typing import Any, Protocol
 from numpy.typing import ArrayLike
 
 from integrators.protocol.protocol import MethodBase
-from integrators.protocol.values import Array, Samples, Status, Trajectories
+from integrators.protocol.values import Array, Samples, Trajectories
 from problems.problem import Problem
 
 
@@ -77,45 +77,20 @@ class Checkpoints(Protocol):
 
 
 class Interruptible(Protocol):
-    """A stepper that another thread can interrupt.
+    """A stepper that another thread can interrupt, and that returns after a time limit.
 
     Attributes
     ----------
     stop : threading.Event or None
         If it is set, ``advance`` soon raises `KeyboardInterrupt`; its samples are discarded.
-    """
-
-    stop: threading.Event | None
-
-
-class TimeLimit(Protocol):
-    """A stepper whose ``advance`` returns with a part of the samples after a time limit.
-
-    Attributes
-    ----------
     time_limit : float
         Seconds after which ``advance`` returns the samples that it has, if there are any, as
         ``FINISHED``; called with the remaining times it continues as if it had not returned. Initially
         infinite.
     """
 
+    stop: threading.Event | None
     time_limit: float
-
-
-class EventStepper(Protocol):
-    """A stepper that searches its steps for events, as `Events.with_events` starts it.
-
-    Attributes
-    ----------
-    search : integrators.events.finder.Finder
-        The search, with the events found so far.
-    """
-
-    search: Any
-
-    def look_to(self, end: float) -> Status:
-        """Search for events from the last step to a time within the next step."""
-        ...
 
 
 class Actions(Protocol):
@@ -215,9 +190,11 @@ class Events(Protocol):
     ) -> Callable[[ArrayLike, ArrayLike | None, float, float], Any]:
         """Compile the functions of events; return a function that starts a trajectory with a search for them.
 
-        That function takes the arguments of ``start`` and the end time of the search; it returns an
-        `EventStepper`. The events do not affect the steps and samples; a terminal one ends the integration
-        with the status ``EVENT``.
+        That function takes the arguments of ``start`` and the end time of the search. The stepper that it
+        returns has besides the ``search``, an `integrators.events.finder.Finder` with the events found so
+        far, and ``look_to(end)``, which searches from the last step to a time within the next step. The
+        events do not affect the steps and samples; a terminal one ends the integration with the status
+        ``EVENT``.
 
         Parameters
         ----------
@@ -337,7 +314,10 @@ class DoubleDouble(Protocol):
     """A program whose states have twice the digits of a double, unevaluated sums of two."""
 
     def start_pairs(self, pairs: Array, par: Array | None = None, t0: float = 0.0) -> Any:
-        """Return a stepper, with `LowParts`, at ``t0``.
+        """Return a stepper at ``t0``.
+
+        Its samples are states rounded to doubles; it has besides ``low``, their low parts at the last
+        ``advance``, shape (m, dim), and ``pairs``, the state at the current time.
 
         Parameters
         ----------
@@ -347,23 +327,6 @@ class DoubleDouble(Protocol):
             As for `Program.start`.
         """
         ...
-
-
-class LowParts(Protocol):
-    """A stepper whose samples are states rounded to doubles.
-
-    Attributes
-    ----------
-    low : ndarray, shape (m, dim), or None
-        Low parts of the samples of the last ``advance``.
-    pairs : ndarray, shape (dim, 2)
-        The state at the current time.
-    """
-
-    low: Array | None
-
-    @property
-    def pairs(self) -> Array: ...
 
 
 class AsHBVM(Protocol):
@@ -381,9 +344,9 @@ class AsHBVM(Protocol):
 
 
 CAPABILITIES: tuple[type, ...] = (
-    Samplings, Destination, KeptError, Checkpoints, Interruptible, EventStepper,
-    Events, Actions, Batches, BatchesAlong, BatchesEvents, PreparedBatches, Threads, PieceSize, TimeLimit,
-    Variations, Gradients, DoubleDouble, LowParts, AsHBVM,
+    Samplings, Destination, KeptError, Checkpoints, Interruptible,
+    Events, Actions, Batches, BatchesAlong, BatchesEvents, PreparedBatches, Threads, PieceSize,
+    Variations, Gradients, DoubleDouble, AsHBVM,
 )  # fmt: skip
 """All of them."""
 

@@ -21,6 +21,7 @@ from integrators.protocol import (
     Checkpoints,
     Destination,
     DoubleDouble,
+    Interruptible,
     KeptError,
     MethodBase,
     Program,
@@ -28,7 +29,6 @@ from integrators.protocol import (
     SamplingName,
     Samplings,
     Status,
-    TimeLimit,
     UserError,
     check_problem,
     offers,
@@ -255,7 +255,7 @@ def _pieces(
     """Advance to all times in pieces, as long as nothing ends that; yield the samples of each."""
     by_steps = watch is not None and watch.looks and _goes_by_steps(stepper, sample)
     length = abs(end - course.start) * (FIRST if watch is not None and watch.looks else UNSEEN)
-    if watch is None and sample != "steps" and offers(stepper, TimeLimit):
+    if watch is None and sample != "steps" and offers(stepper, Interruptible):
         stepper.time_limit, length = SOON, np.inf
     while course.made < grid.size and course.status is Status.FINISHED:
         piece, how, count = grid[course.made :], sample, grid.size - course.made

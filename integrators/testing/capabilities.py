@@ -20,18 +20,15 @@ from integrators.protocol import (
     Destination,
     DoubleDouble,
     Events,
-    EventStepper,
     Gradients,
     Interruptible,
     KeptError,
-    LowParts,
     MethodBase,
     PieceSize,
     PreparedBatches,
     Samplings,
     Status,
     Threads,
-    TimeLimit,
     Variations,
     offers,
 )
@@ -144,7 +141,7 @@ def finds_events_beside_its_steps(method: MethodBase, problem: Problem) -> str |
 
     begin = program.with_events(problem, {"crossing": Event(crossing)})
     stepper = begin(problem.y0, problem.par, problem.t0, float(grid[-1]))
-    require(offers(stepper, EventStepper), "what with_events starts is an EventStepper")
+    require(stepper.search is not None, "what with_events starts has the search")
     solution = integrate(problem, method, grid, events=Event(crossing, name="crossing"))
     change = float(np.max(np.abs(solution.y - plain.y)))
     require(change < ROUNDING, f"events change no sample, but by {change:.1e}")
@@ -189,24 +186,10 @@ def events_may_change_the_state(method: MethodBase, problem: Problem) -> str | N
 
 
 def comes_back_when_it_is_stopped(method: MethodBase, problem: Problem) -> str | None:
-    """Check that ``advance`` raises KeyboardInterrupt once ``stop`` is set."""
-    stepper = start(method, problem)
+    """Check that pieces within a time limit have the bits of one call, and that ``stop`` interrupts."""
+    stepper: Any = start(method, problem)
     if not offers(stepper, Interruptible):
         return "another thread cannot call it back"
-    stepper.stop = threading.Event()
-    stepper.stop.set()
-    try:
-        stepper.advance(irregular(problem))
-    except KeyboardInterrupt:
-        return None
-    raise AssertionError("broken: advance comes back when stop is set")
-
-
-def comes_back_after_its_time(method: MethodBase, problem: Problem) -> str | None:
-    """Check that pieces within a time limit are bitwise identical to one call."""
-    stepper: Any = start(method, problem)
-    if not offers(stepper, TimeLimit):
-        return "it has no limit of time"
     grid = irregular(problem)
     whole = start(method, problem).advance(grid)
     stepper.time_limit, done = 0.0, 0
@@ -215,7 +198,14 @@ def comes_back_after_its_time(method: MethodBase, problem: Problem) -> str | Non
         require(piece.status is Status.FINISHED and piece.t.size > 0, "each piece has a sample")
         require(np.array_equal(piece.y, whole.y[done : done + piece.t.size]), "pieces have the bits of one")
         done += piece.t.size
-    return None
+    stepper = start(method, problem)
+    stepper.stop = threading.Event()
+    stepper.stop.set()
+    try:
+        stepper.advance(irregular(problem))
+    except KeyboardInterrupt:
+        return None
+    raise AssertionError("broken: advance comes back when stop is set")
 
 
 def tangents_follow_and_change_nothing(method: MethodBase, problem: Problem) -> str | None:
@@ -374,7 +364,6 @@ def pairs_hold_twice_the_digits(method: MethodBase, problem: Problem) -> str | N
     for share in (0.0, 0.25):
         pairs = np.stack([problem.y0, share * np.spacing(problem.y0)], axis=1)
         stepper = program.start_pairs(pairs, problem.par, problem.t0)
-        require(offers(stepper, LowParts), "what start_pairs starts has low parts")
         here = stepper.advance(np.array([problem.t0]))
         require(np.array_equal(np.stack([here.y[0], stepper.low[0]], axis=1), pairs), "a start is a sample")
         samples = stepper.advance(grid)
@@ -411,18 +400,15 @@ CHECK_OF: dict[type, Callable[[MethodBase, Problem], str | None]] = {
     Interruptible: comes_back_when_it_is_stopped,
     Events: finds_events_beside_its_steps,
     Actions: events_may_change_the_state,
-    EventStepper: finds_events_beside_its_steps,
     Batches: batches_are_single_trajectories,
     BatchesAlong: batches_along_are_single_trajectories,
     BatchesEvents: batches_find_the_events_of_single_trajectories,
     PreparedBatches: prepared_batches_are_batches,
     Threads: threads_change_no_bits,
     PieceSize: the_size_of_a_piece_is_a_count,
-    TimeLimit: comes_back_after_its_time,
     Variations: tangents_follow_and_change_nothing,
     Gradients: adjoints_are_what_tangents_say,
     DoubleDouble: pairs_hold_twice_the_digits,
-    LowParts: pairs_hold_twice_the_digits,
     AsHBVM: is_the_hbvm_that_it_names,
 }
 """Which check a capability has."""
