@@ -116,8 +116,7 @@ class HBVMProgram(Compiled):
         self.from_cache = all(part.from_cache for part in parts if part is not None)
         self._searches: dict[tuple[tuple[str, int], ...], WithEvents] = {}  # they hold the events
         self._workspace: Workspace | None = None
-        self._in_lanes: tuple[Lanes | None] | None = None
-        self._along: dict[tuple[int, bool], VectorLanes | None] = {}
+        self._lanes: dict[tuple[int, ...], Any] = {}  # by vectors' number and whether they move parameters
         self._many: HBVMProgram | None = None
         if self.solver.strategy == ALWAYS_IMPLICIT:
             self.implicit()
@@ -270,16 +269,8 @@ class HBVMProgram(Compiled):
 
     def in_lanes(self) -> Lanes | None:
         """Return the method on trajectories in lanes, compiled the first time; ``None`` where it has none."""
-        if self._in_lanes is None:
-            lanes_, seconds = None, 0.0
-            if self.lanes and not self.kept and self.free and self.solver.strategy != ALWAYS_IMPLICIT:
-                lanes_, seconds = lanes_of(
-                    self.system, self.constants, self.second, self.shape.unit, self.varying
-                )
-            self.compile_seconds += seconds
-            self.from_cache = self.from_cache and (lanes_ is None or lanes_.from_cache)
-            self._in_lanes = (lanes_,)
-        return self._in_lanes[0]
+        shape = self.second, self.shape.unit, self.varying
+        return self._by_lanes((), self.free, lambda: lanes_of(self.system, self.constants, *shape))
 
     def in_lanes_along(self, count: int, moves: bool) -> VectorLanes | None:
         """Return the method on trajectories in lanes, each with so many tangent vectors, if it has one.
@@ -297,16 +288,19 @@ class HBVMProgram(Compiled):
             ``None`` for adaptive steps, whose lengths would depend on the vectors' errors, for what has no
             lanes or no formula, and for more components and vectors than `VectorLanes.take` allows.
         """
-        if (count, moves) not in self._along:
-            steps_are_fixed = not (self.varying or self.kept)
-            can = steps_are_fixed and self.lanes and self.system.traced
+        can = not self.varying and self.system.traced
+        return self._by_lanes((count, moves), can, lambda: self._compiled_along(count, moves))
+
+    def _by_lanes(self, key: tuple[int, ...], can: bool, compile_: Callable[[], tuple[Any, float]]) -> Any:
+        """Return what runs on lanes, compiled the first time, and count the seconds; ``None``: it cannot."""
+        if key not in self._lanes:
             lanes_, seconds = None, 0.0
-            if can and self.solver.strategy != ALWAYS_IMPLICIT:
-                lanes_, seconds = self._compiled_along(count, moves)
+            if can and self.lanes and not self.kept and self.solver.strategy != ALWAYS_IMPLICIT:
+                lanes_, seconds = compile_()
             self.compile_seconds += seconds
             self.from_cache = self.from_cache and (lanes_ is None or lanes_.from_cache)
-            self._along[count, moves] = lanes_
-        return self._along[count, moves]
+            self._lanes[key] = lanes_
+        return self._lanes[key]
 
     def _compiled_along(self, count: int, moves: bool) -> tuple[VectorLanes | None, float]:
         """Return the lanes for so many vectors, if they are few enough, and the seconds that took."""
