@@ -51,8 +51,6 @@ class Grid(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
         Whether samples are moved to the nearest ends of steps of a method with a fixed one, so
         that they cost it nothing in quality, and the end is that of a run without samples,
         the one that is timed.
-    own_steps : bool
-        The former name of ``at_steps``, which stored results have.
 
     Without step and count: the problem's own grid, or else 1000 intervals.
     """
@@ -64,12 +62,8 @@ class Grid(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     also: list[Positive] = []
     multiple_of: Positive | None = None
     at_steps: bool = False
-    own_steps: bool = False
 
     def __post_init__(self) -> None:
-        if self.own_steps:
-            msgspec.structs.force_setattr(self, "at_steps", True)
-            msgspec.structs.force_setattr(self, "own_steps", False)
         if self.step is not None and self.count is not None:
             raise InputError("a grid has a step or a count, not both.")
         if self.step is not None and self.spacing != "equal":

@@ -150,7 +150,7 @@ def case_key(case: Case, problem: Problem, method: MethodBase) -> dict[str, Any]
             for name, asked in (("checks", case.checks), ("ensemble", case.ensemble))
             if asked not in (None, Checks())
         }
-        | ({"own_steps": True} if case.grid.at_steps else {})  # the key that stored cases have
+        | ({"at_steps": True} if case.grid.at_steps else {})
     )
 
 

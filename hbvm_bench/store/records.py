@@ -100,8 +100,6 @@ class TimingRound(msgspec.Struct, frozen=True, kw_only=True):
         Integrations in one sample.
     compile : Compile
         The compilation in this process.
-    share : float
-        Processor seconds per wall second while sampling: below 1 something else used the core.
     calibration : list of float
         Seconds of the calibration loop before each sample and after the last.
     number : int or None
@@ -113,7 +111,6 @@ class TimingRound(msgspec.Struct, frozen=True, kw_only=True):
     samples: list[float]
     repeats: int
     compile: Compile
-    share: float = 1.0
     calibration: list[float] = []
     number: int | None = None
     compilation: int = 0
@@ -194,11 +191,6 @@ class Timing(msgspec.Struct, frozen=True, kw_only=True):
             return {}
         q1, _, q3 = quantiles(samples, n=4, method="inclusive") if len(samples) > 1 else samples * 3
         return {"median": median(samples), "min": samples[0], "q1": q1, "q3": q3}
-
-    @property
-    def share(self) -> float:
-        """Return the least share of a core that a round had; 1 without rounds."""
-        return min((round_.share for round_ in self.rounds), default=1.0)
 
     @property
     def compile(self) -> Compile | None:

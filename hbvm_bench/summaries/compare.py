@@ -24,7 +24,6 @@ ROUNDING, ROUNDING_FACTOR = 1e-11, 4.0
 # 1.14 from run to run where a call takes 0.2 ms.
 SMALLEST_RATIO = 1.2
 DEVIATIONS = 4.0
-LEAST_SHARE = 0.9  # of a core; a sample that had less tells what else was running
 
 
 @dataclass(frozen=True)
@@ -186,8 +185,8 @@ def _untimed(records: Sequence[Record]) -> Iterator[str]:
                 yield "timed in one run only"
         elif not all(round_.calibration for round_ in timing.rounds):
             yield "taken without the calibration"
-        elif timing.share < LEAST_SHARE:
-            yield f"a round had only {timing.share:.0%} of a core"
+        elif timing.load is not None and (busy := timing.load.verdict()):
+            yield busy
 
 
 def _logarithms(record: Record) -> list[float]:

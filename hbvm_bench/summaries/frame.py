@@ -32,8 +32,8 @@ INTEGERS = (
     *("round", "sample", "component", "repeats"),
 )
 FLOATS = (
-    *("t_stop", "process_seconds", "process_peak_gib", "seconds", "calibration", "share", "compile_seconds"),
-    *("time_median", "time_min", "time_q1", "time_q3", "time_share", "time_calibration", "t", "value"),
+    *("t_stop", "process_seconds", "process_peak_gib", "seconds", "calibration", "compile_seconds"),
+    *("time_median", "time_min", "time_q1", "time_q3", "time_calibration", "t", "value"),
     *METRICS,
 )
 TRUTHS = ("compile_cached",)
@@ -170,7 +170,6 @@ def _times(timing: Timing) -> FrameRow:
         "time_rounds": len(timing.rounds),
         "time_samples": len(timing.samples),
         "time_why": timing.why,
-        "time_share": timing.share,
         "time_calibration": median(loops) if loops else None,
     }
 
@@ -186,7 +185,6 @@ def _timings(record: Record, store: Store) -> Iterator[FrameRow]:
                 "seconds": seconds,
                 "repeats": round_.repeats,
                 "calibration": median(round_.calibration) if round_.calibration else None,
-                "share": round_.share,
                 "compile_seconds": round_.compile.seconds,
                 "compile_cached": round_.compile.cached,
             }

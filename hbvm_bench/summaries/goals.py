@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from statistics import median
 from typing import Literal
 
 import msgspec
@@ -10,7 +9,7 @@ import msgspec
 from hbvm_bench.campaign.file import Campaign, Goal, ProblemEntry, name_of
 from hbvm_bench.measure.metrics import METRICS, find
 from hbvm_bench.measure.timing import Spread
-from hbvm_bench.store.records import Load, Record
+from hbvm_bench.store.records import Record
 from hbvm_bench.summaries import standings
 from hbvm_bench.summaries.points import number
 from hbvm_bench.summaries.rows import format_metric
@@ -107,12 +106,12 @@ def disturbed(goal: Goal, records: Sequence[Record | None]) -> str:
 def other_work(records: Sequence[Record | None]) -> str:
     """Return why the times of cases are not judged: the share of a core of other work; else ``""``."""
     timings = [item.timing for item in records if item is not None and item.timing is not None]
-    if not timings:
-        return ""
-    loads = [item.load for item in timings if item.load is not None]
-    shares = [1.0 - median(round_.share for round_ in item.rounds) for item in timings if item.rounds]
-    most = Load(others=max([0.0, *shares, *(load.most for load in loads)]), steal=0.0)
-    return f"{most.verdict()} during the timing" if most.verdict() else ""
+    busiest = max(
+        (load for item in timings if (load := item.load) is not None),
+        key=lambda load: load.most,
+        default=None,
+    )
+    return f"{busiest.verdict()} during the timing" if busiest is not None and busiest.verdict() else ""
 
 
 def _judged(goal: Goal, entry: ProblemEntry, records: Sequence[Record]) -> Verdict:

@@ -26,7 +26,6 @@ SHORT = {
     "drift": "drift",
 }
 """Every kind in a few signs, by the keys of `hbvm_bench.measure.drift.KINDS`; powers have exponents."""
-FORMER_POWERS = ("square root", "linear")  # in archives; beside them stands the exponent
 NOT_CLEAR = "not clear"
 COLUMNS = ("growth", "power of t", "mean", "per unit of time", "time", "× HBVM and Gauss")
 FEWEST_STARTS = 16
@@ -34,12 +33,9 @@ FEWEST_STARTS = 16
 
 
 def clear(growth: ErrorGrowth) -> ErrorGrowth:
-    """Return a growth as it is reported: from fewer than `FEWEST_STARTS` initial conditions it is not clear.
-
-    Powers of t that an older archive calls by a name are powers.
-    """
+    """Return a growth as it is reported: not clear from fewer than `FEWEST_STARTS` initial conditions."""
     if growth.kind is None or growth.starts >= FEWEST_STARTS:
-        return replace(growth, kind="power") if growth.kind in FORMER_POWERS else growth
+        return growth
     from_few = f"{NOT_CLEAR} from {growth.starts} initial condition" + "s" * (growth.starts != 1)
     return replace(growth, kind=None, why=from_few)
 

@@ -10,7 +10,6 @@ from hbvm_bench.summaries.points import by_family, by_problem, family_of, short_
 from hbvm_bench.summaries.rows import group_of, reached, reason_of
 from hbvm_bench.summaries.table import Table
 
-UNDISTURBED = 0.9  # of a core, in the timing pass
 STEADY = 1.5  # quartiles of the calibration around a timing sample
 
 State = Literal["on", "apart", "uncompared", "off", "ended", "refused", "absent"]
@@ -102,7 +101,7 @@ def sentences(records: Sequence[Record]) -> list[str]:
 
 def doubts(records: Sequence[Record]) -> list[str]:
     """Return sentences on what to distrust: times taken on a busy machine, several machines, limits."""
-    said = disturbed(records) + beside(records)
+    said = beside(records)
     rounds = _rounds(records)
     calibrations = sorted(seconds for round_ in rounds for seconds in round_.calibration)
     if len(calibrations) >= 4:
@@ -130,14 +129,8 @@ def doubts(records: Sequence[Record]) -> list[str]:
 
 
 def disturbed(records: Sequence[Record]) -> list[str]:
-    """Return a sentence where the machine had other work while times were taken."""
-    share = median(round_.share for round_ in rounds) if (rounds := _rounds(records)) else 1.0
-    if share >= UNDISTURBED:
-        return []
-    return [
-        f"The times are disturbed: the machine had other work and left half of the visits less "
-        f"than {share:.0%} of a core. Ratios below 2 are not significant."
-    ]
+    """Return a sentence where the machine had so much other work that the times are doubtful."""
+    return beside(records) if any(load.verdict() for load in _loads(records)) else []
 
 
 def beside(records: Sequence[Record]) -> list[str]:

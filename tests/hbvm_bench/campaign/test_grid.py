@@ -1,4 +1,3 @@
-import msgspec
 import numpy as np
 import pytest
 from hypothesis import given
@@ -77,9 +76,3 @@ def test_samples_of_a_fixed_step_are_at_its_steps_backwards_too():
         assert np.array_equal(np.abs(t[:-1]), np.rint(np.abs(t[:-1]) / 0.3) * 0.3)
         assert np.all(np.diff(np.abs(t)) > 0)
     assert np.array_equal(Grid(count=40, at_steps=True).times(problem), Grid(count=40).times(problem))
-
-
-def test_stored_grids_have_the_former_name_of_at_steps():
-    stored = msgspec.convert({"count": 40, "own_steps": True}, Grid)
-    assert stored == Grid(count=40, at_steps=True)
-    assert msgspec.to_builtins(stored) == {"count": 40, "at_steps": True}

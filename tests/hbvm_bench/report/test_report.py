@@ -16,7 +16,7 @@ from hbvm_bench.report.markdown import code, plain
 from hbvm_bench.report.page import document
 from hbvm_bench.report.problem import summary
 from hbvm_bench.report.write import write
-from hbvm_bench.store.records import Timing, Value
+from hbvm_bench.store.records import Load, Timing, Value
 from hbvm_bench.store.store import PACKED, Index, Store
 from hbvm_bench.summaries.rows import Task
 from problems.errors import InputError
@@ -286,16 +286,10 @@ def test_of_an_ensemble_it_is_said_how_many_ends_are_known(run):
 
 
 def test_times_taken_on_a_busy_machine_say_so(run):
-    def with_share(record, share):
-        if record.timing is None:
-            return record
-        rounds = [msgspec.structs.replace(one, share=share) for one in record.timing.rounds]
-        return msgspec.structs.replace(record, timing=Timing(rounds=rounds))
+    def said(others):
+        timing = Timing(rounds=made_up_run.timed([1.0]), load=Load(others=others, steal=0.0))
+        records = [msgspec.structs.replace(record, timing=timing) for record in reading.records(run)]
+        return [sentence for sentence in words.summary(records) if "doubtful" in sentence]
 
-    def said(share):
-        return [
-            s for s in words.summary([with_share(r, share) for r in reading.records(run)]) if "disturbed" in s
-        ]
-
-    assert said(0.99) == []
-    assert "60% of a core" in said(0.6)[0]
+    assert said(0.01) == []
+    assert "used 60% of a core" in said(0.6)[0]

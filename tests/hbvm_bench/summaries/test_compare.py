@@ -12,7 +12,7 @@ from hbvm_bench import cli
 from hbvm_bench.campaign.file import Campaign, MethodEntry
 from hbvm_bench.measure.metrics import METRICS
 from hbvm_bench.store.merge import merge
-from hbvm_bench.store.records import Compile, Result, Timing, TimingRound, Value
+from hbvm_bench.store.records import Compile, Load, Result, Timing, TimingRound, Value
 from hbvm_bench.store.store import Index, Store
 from hbvm_bench.summaries import compare as comparing
 from hbvm_bench.summaries.compare import compare
@@ -23,7 +23,7 @@ from tests.hbvm_bench import made_up_run
 VALUES = {"energy_max": 3e-16, "position_end": 2.5e-7, "steps": 1000.0, "warm_seconds": 0.01}
 
 
-def timing(rng, level=0.01, noise=0.02, speed=1.0, share=1.0):
+def timing(rng, level=0.01, noise=0.02, speed=1.0, load=None):
     """Return three rounds of two samples; rounds scatter by ``noise``, the machine's speed is its own."""
     rounds = [
         TimingRound(
@@ -31,11 +31,10 @@ def timing(rng, level=0.01, noise=0.02, speed=1.0, share=1.0):
             repeats=3,
             compile=Compile(seconds=0.1, cached=True),
             calibration=(0.010 * speed * np.exp(rng.normal(0, 0.003, 3))).tolist(),
-            share=share,
         )
         for drift in np.exp(rng.normal(0, noise, 3))
     ]
-    return Timing(rounds=rounds)
+    return Timing(rounds=rounds, load=load)
 
 
 def make(folder, count=3, seed=0, prefix="0", edit=lambda number, record: record):
@@ -138,11 +137,11 @@ def test_noise_is_hardly_ever_called_a_change(tmp_path):
 
 
 def test_times_without_a_core_of_their_own_are_not_compared(tmp_path):
-    starved = timing(np.random.default_rng(1), share=0.5)
+    starved = timing(np.random.default_rng(1), load=Load(others=0.5, steal=0.0))
     second = make(tmp_path / "b", edit=lambda i, r: msgspec.structs.replace(r, timing=starved))
     found = compare(make(tmp_path / "a"), second)
     assert (found.timed, found.noise) == (0, None)
-    assert "only 50% of a core" in found.untimed[0]
+    assert "other work took 50% of a core" in found.untimed[0]
     assert found.unchanged
 
 

@@ -5,7 +5,7 @@ from msgspec.structs import replace
 
 from hbvm_bench.campaign.file import Campaign, Goal, MethodEntry, ProblemEntry, parse
 from hbvm_bench.commands.run import dated
-from hbvm_bench.store.records import Load, Timing, Value
+from hbvm_bench.store.records import Load, Value
 from hbvm_bench.store.store import Index, Store
 from hbvm_bench.summaries import goals, standings
 from problems.errors import InputError, UnknownNameError
@@ -165,13 +165,6 @@ def test_a_speed_measured_beside_other_work_is_not_judged(load):
     assert judged(Goal(at=100.0, method="Gauss(s=8, h=0.1)"), records).verdict == "not judged"
     energy = Goal(metric="energy_max", at=1e-13, method="Gauss(s=8, h=0.1)")
     assert judged(energy, records).verdict == "reached"
-
-
-def test_a_visit_that_had_half_a_core_is_not_judged():
-    def shared(one):
-        return replace(one, timing=Timing(rounds=[replace(each, share=0.5) for each in one.timing.rounds]))
-
-    assert judged(Goal(against="Taylor", ratio=1.0), [*map(shared, RECORDS)]).verdict == "not judged"
 
 
 @pytest.mark.parametrize(
