@@ -71,7 +71,9 @@ class Grid(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
         if self.first is not None and self.spacing != "log":
             raise InputError("first= belongs to a grid with spacing='log'.")
 
-    def times(self, problem: Problem, h: float | None = None) -> NDArray[np.float64]:
+    def times(
+        self, problem: Problem, h: float | None = None, made: solutions.References = solutions.NONE
+    ) -> NDArray[np.float64]:
         """Return the sampling times from ``t0`` to ``t_end``, both included, shape (n,).
 
         Parameters
@@ -80,6 +82,8 @@ class Grid(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
             Has the interval.
         h : float, optional
             The method's fixed step, which ``at_steps`` asks for.
+        made : mapping, optional
+            References that do not come with the package; see `hbvm_bench.reference.solutions.find`.
 
         Raises
         ------
@@ -89,7 +93,7 @@ class Grid(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
         """
         if problem.t_end == problem.t0:
             raise InputError(f"{problem} ends at its start, t0={problem.t0!r}: give it a later t_end.")
-        times, span = self._shared(problem), problem.t_end - problem.t0
+        times, span = self._shared(problem, made), problem.t_end - problem.t0
         further = problem.t0 + np.copysign([t for t in self.also if t < abs(span)], span)
         times = np.union1d(times, further)[:: 1 if span > 0.0 else -1] if further.size else times
         unit = h if self.at_steps and h else self.multiple_of
@@ -99,13 +103,13 @@ class Grid(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
         inside = after[after < abs(span) * (1 - 1e-12)]
         return np.append(problem.t0 + np.copysign(inside, span), problem.t_end)
 
-    def _shared(self, problem: Problem) -> NDArray[np.float64]:
+    def _shared(self, problem: Problem, made: solutions.References) -> NDArray[np.float64]:
         """Return the times that are the same for every method."""
         span = problem.t_end - problem.t0
         count = self.count or 1000
         limits.check(f"a grid with count={shown(count)}", "SAMPLES", count)
         if self.spacing != "equal":
-            return self._uneven(problem, span, count)
+            return self._uneven(problem, span, count, solutions.find(problem, made))
         if self.step is None and self.count is None and problem.times is not None:
             return np.asarray(problem.times, dtype=np.float64)
         if self.step is None:
@@ -116,7 +120,9 @@ class Grid(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
         inside = times[np.abs(times - problem.t0) < abs(span) * (1 - 1e-12)]
         return np.append(inside, problem.t_end)
 
-    def _uneven(self, problem: Problem, span: float, count: int) -> NDArray[np.float64]:
+    def _uneven(
+        self, problem: Problem, span: float, count: int, known: solutions.Reference | None
+    ) -> NDArray[np.float64]:
         number = np.arange(count)
         cells = (number + (GOLDEN * (number + 1)) % 1.0) / count
         if self.spacing == "log":
@@ -128,7 +134,6 @@ class Grid(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
                 )
             cells = first ** (1.0 - cells)
         times = np.concatenate([[problem.t0, problem.t_end], problem.t0 + span * cells])
-        known = solutions.find(problem)
         if known is not None:
             inside = (known.t - problem.t0) / span
             times = np.concatenate([times, known.t[(inside > 0.0) & (inside < 1.0)]])

@@ -17,6 +17,8 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
+import numpy as np
+from numpy.typing import NDArray
 
 import integrators.registry
 import problems.registry
@@ -53,6 +55,10 @@ class Resolved:
         sha256 in hexadecimal.
     key : dict
         What was hashed.
+    times : ndarray
+        The sampling times.
+    beside : own.Beside
+        What must be known of the problem beside its text.
     """
 
     case: Case
@@ -60,9 +66,11 @@ class Resolved:
     method: MethodBase
     id: str
     key: dict[str, Any]
+    times: NDArray[np.float64]
+    beside: own.Beside
 
 
-def resolve(case: Case) -> Resolved:
+def resolve(case: Case, known: own.Known = own.NOTHING) -> Resolved:
     """Check the names and options of a case and give it its id.
 
     Raises
@@ -71,25 +79,33 @@ def resolve(case: Case) -> Resolved:
         For an unknown name or option, with the nearest names, or a value that
         the problem or the method refuses.
     """
-    problem = make_problem(case.problem)
+    problem = make_problem(case.problem, known)
     method = make_method(case.method)
-    case.grid.times(problem)
+    times = case.grid.times(problem, fixed_step(method), known.references)
     # not repr(method), which is a third party's own
     text = str(Spec(parse_spec(case.method).name, method.options()))
     canonical = msgspec.structs.replace(case, problem=repr(problem), method=text)
-    key = case_key(canonical, problem, method)
+    key = case_key(canonical, problem, method, times)
     text = json.dumps(key, sort_keys=True, separators=(",", ":"), ensure_ascii=True, allow_nan=False)
-    return Resolved(canonical, problem, method, hashlib.sha256(text.encode()).hexdigest(), key)
+    number = hashlib.sha256(text.encode()).hexdigest()
+    return Resolved(canonical, problem, method, number, key, times, known.beside(problem))
 
 
-@lru_cache(maxsize=64)
-def make_problem(text: str) -> Problem:
-    """Make the problem that ``text`` specifies; the last ones are kept, for a campaign has them often.
+def make_problem(text: str, known: own.Known = own.NOTHING) -> Problem:
+    """Make the problem that ``text`` specifies; of one of the user's own the formula must be ``known``."""
+    return known.problem(parse_spec(text)) or _registered(text)
 
-    No user's code is run: of a problem of the user's own the formula must be known (`own`).
-    """
+
+@lru_cache(maxsize=64)  # a campaign has them often
+def _registered(text: str) -> Problem:
     spec = parse_spec(text)
-    return own.find(spec) or problems.load(spec.name, **spec.arguments)
+    return problems.load(spec.name, **spec.arguments)
+
+
+def printed(text: str) -> str:
+    """Return the problem that ``text`` specifies as cases and records have it: as it prints."""
+    spec = parse_spec(text)
+    return str(spec) if own.is_own(spec) else repr(_registered(text))
 
 
 def typed_problem(text: str) -> Problem:
@@ -126,12 +142,11 @@ def of_study(place: str, table: str) -> Any:
     return known[name]
 
 
-def case_key(case: Case, problem: Problem, method: MethodBase) -> dict[str, Any]:
+def case_key(case: Case, problem: Problem, method: MethodBase, times: NDArray[np.float64]) -> dict[str, Any]:
     """Return everything the numbers of a case depend on, as JSON values.
 
     Notes and settings labels are left out: they are words about the case.
     """
-    grid = case.grid.times(problem, fixed_step(method))
     return (
         {
             "problem": case.problem,
@@ -140,7 +155,7 @@ def case_key(case: Case, problem: Problem, method: MethodBase) -> dict[str, Any]
             "parameters": [value.hex() for value in problem.par.tolist()],
             "method": f"{type(method).__module__}.{type(method).__name__}",
             "options": {name: repr(value) for name, value in method.options(defaults=True).items()},
-            "grid": hashlib.sha256(grid.tobytes()).hexdigest(),
+            "grid": hashlib.sha256(times.tobytes()).hexdigest(),
             "versions": versions_of(method),
             "source": source_digest(method, case),
         }
@@ -193,7 +208,7 @@ def source_digest(method: MethodBase, case: Case) -> str:
     of the user's own has no source: its name holds the digest of its formula.
     """
     spec = parse_spec(case.problem)
-    made_in = [] if own.find(spec) else [problems.registry.factory(spec.name).__module__]
+    made_in = [] if own.is_own(spec) else [problems.registry.factory(spec.name).__module__]
     theirs = [name for name in (type(method).__module__, *made_in) if name.partition(".")[0] not in OWN]
     whole = hashlib.sha256(installed().encode())
     for name in theirs:

@@ -15,6 +15,8 @@ import sys
 import traceback
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
@@ -35,8 +37,6 @@ from problems.problem import Problem
 
 DIGITS = 8  # of a digest, in a problem's name
 KEPT = "@"
-
-_formulas: dict[str, str] = {}  # JSON, by the problem's text
 
 
 class _Place(NamedTuple):
@@ -68,46 +68,72 @@ class Beside(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     reference: str = ""
 
 
-def beside(problem: Problem) -> Beside:
-    """Return what another process needs for a problem."""
-    return Beside(formula=formula(repr(problem)), reference=solutions.made_here(problem))
+@dataclass(frozen=True)
+class Known:
+    """What is known of problems beside their texts, for whoever makes them or looks for their references.
+
+    Attributes
+    ----------
+    formulas : mapping of str to str
+        Of problems of the user's own: JSON, by the text that the problem prints as.
+    references : mapping
+        Those that do not come with the package; see `hbvm_bench.reference.solutions.find`.
+    """
+
+    formulas: Mapping[str, str] = field(default_factory=dict)
+    references: solutions.References = field(default_factory=dict)
+
+    def __or__(self, other: "Known") -> "Known":
+        return Known({**self.formulas, **other.formulas}, {**self.references, **other.references})
+
+    def beside(self, problem: Problem) -> Beside:
+        """Return what another process needs for a problem."""
+        file = self.references.get(solutions.key_of(problem)) if self.references else None
+        return Beside(
+            formula=self.formulas.get(repr(problem), ""),
+            reference="" if file is None else solutions.encode(file),
+        )
+
+    def problem(self, spec: Spec) -> Problem | None:
+        """Return a problem of the user's own; ``None`` for a text that is no file's.
+
+        Raises
+        ------
+        problems.errors.InputError
+            If its formula is not known: no code is run for it.
+        """
+        if not is_own(spec):
+            return None
+        if text := self.formulas.get(str(spec)):
+            return _unpacked(text)
+        why = "its formula should lie beside the results of its run, and does not"
+        why = why if _Place.from_spec(spec).digest else "no Python file is run here"
+        raise InputError(f"the problem {shown(str(spec))} is not known: {why}.")
 
 
-def add_known(known: Beside) -> None:
-    """Know what another process knew of a problem.
+NOTHING = Known()
+
+
+def known_from(beside: Beside) -> Known:
+    """Return what another process knew of a problem.
 
     Raises
     ------
     ValueError, TypeError, LookupError
         If it is damaged.
     """
-    if known.formula:
-        _add_formula(known.formula)
-    if known.reference:
-        solutions.add_known(known.reference)
+    formulas, references = {}, {}
+    if beside.formula:
+        formulas[repr(_unpacked(beside.formula))] = beside.formula
+    if beside.reference:
+        file = solutions.decode(beside.reference)
+        references[file.key] = file
+    return Known(formulas, references)
 
 
-def formula(text: str) -> str:
-    """Return the data of a kept problem, as JSON, by the text that it prints as; ``""`` for any other."""
-    return _formulas.get(text, "")
-
-
-def find(spec: Spec) -> Problem | None:
-    """Return a problem of the user's own whose data are known here; ``None`` for a text that is no file's.
-
-    Raises
-    ------
-    problems.errors.InputError
-        If they are not known: no code is run for it.
-    """
-    place = _Place.from_spec(spec)
-    if not place.file:
-        return None
-    if text := formula(str(spec)):
-        return _unpacked(text)
-    why = "its formula should lie beside the results of its run, and does not"
-    why = why if place.digest else "no Python file is run here"
-    raise InputError(f"the problem {shown(str(spec))} is not known: {why}.")
+def is_own(spec: Spec) -> bool:
+    """Whether a problem is one of a Python file, and not of a registry."""
+    return bool(_Place.from_spec(spec).file)
 
 
 def read(text: str) -> Problem:
@@ -126,8 +152,8 @@ def is_file(text: str) -> bool:
     return file_of(text).endswith(".py")
 
 
-def opened(campaign: Campaign, folder: Path | None, tell: Callable[[str], None]) -> Campaign:
-    """Return a campaign whose problems from Python files are kept as formulas; the files are run.
+def opened(campaign: Campaign, folder: Path | None, tell: Callable[[str], None]) -> tuple[Campaign, Known]:
+    """Return a campaign whose problems from Python files are kept as formulas, and these; the files are run.
 
     The Python files must lie in ``folder``, beside the campaign's, or without one anywhere; ``tell``
     is called with the name of each before it is run.
@@ -146,8 +172,8 @@ def opened(campaign: Campaign, folder: Path | None, tell: Callable[[str], None])
         files.path(file)
         tell(file)
     if not asked:
-        return campaign
-    return replace(
+        return campaign, NOTHING
+    kept = replace(
         campaign,
         problems=[ensemble for entry in campaign.entries() for ensemble in _kept(entry, files)],
         ensembles=[
@@ -155,6 +181,7 @@ def opened(campaign: Campaign, folder: Path | None, tell: Callable[[str], None])
             for ensemble in campaign.ensembles
         ],
     )
+    return kept, Known(files.formulas)
 
 
 def _kept(entry: ProblemEntry, files: "_Files") -> list[ProblemEntry]:
@@ -173,9 +200,10 @@ class _Files:
     def __init__(self, folder: Path | None) -> None:
         self.folder = folder
         self.modules: dict[Path, ModuleType] = {}
+        self.formulas: dict[str, str] = {}  # of what was kept
 
     def kept(self, text: str) -> str:
-        """Return what the problem of a file is called once its formula is known here."""
+        """Keep the formula of a file's problem, and return what this is called then."""
         spec = parse_spec(text)
         problem, place = self.problem(spec), _Place.from_spec(spec)
         if not problem.system.traced:
@@ -184,7 +212,7 @@ class _Files:
                 "write it as a problems.VectorField or a problems.Hamiltonian."
             )
         named = _titled(problem, f"{place.file}{KEPT}{_digest(problem)}:{place.function}", spec.arguments)
-        _add_formula(_packed(named))
+        self.formulas[repr(named)] = _packed(named)
         return repr(named)
 
     def problem(self, spec: Spec) -> Problem:
@@ -324,15 +352,11 @@ def _packed(problem: Problem) -> str:
     return json.dumps({"problem": plain, "arrays": {name: a.tolist() for name, a in arrays.items()}})
 
 
+@lru_cache(maxsize=64)
 def _unpacked(text: str) -> Problem:
     plain = json.loads(text)
     problem = unpacked_problem(plain["problem"], {name: np.array(a) for name, a in plain["arrays"].items()})
     assert problem is not None
-    return problem
-
-
-def _add_formula(text: str) -> None:
-    problem = _unpacked(text)
     if _Place.from_spec(parse_spec(repr(problem))).digest != _digest(problem):
         raise ValueError("a problem is not the one that its name says")
-    _formulas[repr(problem)] = text
+    return problem

@@ -35,7 +35,7 @@ SEPARATE = {
         "about": ("advise", "engines", "inspect"),
         "doctor": ("doctor", "warm"),
         "paper": ("paper",),
-        "reports": ("gallery", "report"),
+        "reports": ("report",),
         "run": ("run",),
         "stores": ("compare", "export", "merge"),
         "studies": ("automatic", "endure", "race"),

@@ -1,4 +1,4 @@
-"""``hbvm-bench report | gallery``: pages from what is stored."""
+"""``hbvm-bench report``: pages from what is stored."""
 
 import webbrowser
 from pathlib import Path
@@ -60,23 +60,3 @@ def report(
         from hbvm_bench.report.index import write_index
 
         print(write_index(index))
-
-
-def gallery(
-    directory: Annotated[Path, typer.Argument(help="Directory of problems.md, as in docs.")],
-    pictures: Annotated[bool, typer.Option(help="Draw the pictures again.")] = True,
-    times: Annotated[
-        bool, typer.Option("--compile-times", help="Only measure how long compiling takes: compile_times.md.")
-    ] = False,
-) -> None:
-    """Write the pages on problems and engines, with formulas and pictures, from the problems themselves."""
-    from hbvm_bench.gallery import compile_times, pages
-
-    ensure_writable(directory)
-    if times:
-        path = directory / "compile_times.md"
-        path.write_text(compile_times.page(), encoding="utf-8")
-        print(path)
-        return
-    for path in pages.write(directory, with_pictures=pictures):
-        print(path)

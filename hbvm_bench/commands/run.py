@@ -82,7 +82,7 @@ def run(
     """
     campaign = _campaign(name, problem, method, step, reference)
     campaign = quick_run(campaign) if quick else campaign
-    campaign = opened(campaign, name)
+    campaign, known = opened(campaign, name)
     study = None if name is None else file_of(name).parent
     if report_to is not None or (study is not None and (study / "page.md").is_file()):
         from hbvm_bench.report.page import check  # what draws costs seconds to import
@@ -100,6 +100,7 @@ def run(
         jobs=jobs,
         timing=timing,
         whole=True,
+        known=known,
     )
     show(campaign, store)
     if report_to is not None:
@@ -120,7 +121,7 @@ def refuse_died(store: Store) -> None:
     raise typer.Exit(UNFINISHED)
 
 
-def opened(campaign: Campaign, name: str | None) -> Campaign:
+def opened(campaign: Campaign, name: str | None) -> tuple[Campaign, own.Known]:
     """Run the Python files beside a campaign's, or those that a command line names; see `own.opened`."""
 
     def tell(file: str) -> None:
@@ -181,10 +182,12 @@ def carry_out(
     jobs: int | None = None,
     timing: bool = True,
     whole: bool = False,
+    known: own.Known = own.NOTHING,
 ) -> Store:
     """Run what is missing of a campaign in a directory, and return its store; ``command`` runs it again.
 
-    ``study`` is the folder of the campaign's file, in which its computations are.
+    ``study`` is the folder of the campaign's file, in which its computations are; ``known`` is what is known
+    of its problems beside their texts.
 
     All that a campaign says is checked where it is ``whole``: what is left out of one, such as a method, may
     still be named in a goal.
@@ -197,20 +200,20 @@ def carry_out(
         With 130 after Ctrl-C, and 1 if an executor lost some cases; what finished is kept.
     """
     store = Store(directory)
-    store.add_known()
-    cases = loop.plan(campaign)
+    known = store.known() | known
+    cases = loop.plan(campaign, known)
     if whole:
         checked.check(campaign, cases)
     computations = computing.plan(campaign, study)
     with executors.opened(executor, jobs) as pool:  # what is refused is refused before anything is written
         store.prepare()
-        if references.make_missing(campaign, store, _say):  # to which the grid and the ids belong
-            cases = loop.plan(campaign)
+        if (more := references.make_missing(campaign, store, known, _say)) is not known:
+            known, cases = more, loop.plan(campaign, more)  # the grid and the ids belong to references
         with store.locked():
             ids = [case.id for case in cases]
             asked = dated(campaign, store)
             index = Index(campaign=asked, ids=ids, version=version("hbvm-bench"), command=command)
-            store.write_index(index)
+            store.write_index(index, known)
             try:
                 _run(campaign, cases, computations, store, pool, timing)
             except (KeyboardInterrupt, InterruptedRunError):

@@ -209,7 +209,7 @@ def exponent_high(m: Measured) -> float | str:
     return _of_chaos(m, "exponent", 2)
 
 
-@metric("off-axis distance", "off axis", "length")
+@metric("symmetry violation", "symmetry", "length")
 def guard_max(m: Measured) -> float | str:
     """Largest value of a quantity that is exactly 0 by the problem's symmetry (Sitnikov: the planetoid's
     distance from the axis). If it is not 0, the run follows another trajectory.
@@ -316,7 +316,9 @@ def throughput(m: Measured) -> float | str:
 
 @metric("compile time", "compile", "s", whole_interval=False)
 def compile_seconds(m: Measured) -> float | str:
-    """Seconds of compilation before the first step, from a cache where the library keeps one."""
+    """Seconds of compilation before the first step, without what an earlier case of the same process has
+    compiled: where a library shares code among settings, all but the first of them take less.
+    """
     compiled = m.timing.compile if m.timing is not None and m.timing.compile else m.compile
     if compiled is None:
         return LOADED

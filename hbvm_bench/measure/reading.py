@@ -12,6 +12,7 @@ import msgspec
 import problems
 from hbvm_bench.campaign import folder
 from hbvm_bench.campaign.identity import make_problem
+from hbvm_bench.campaign.own import NOTHING, Known
 from hbvm_bench.measure import measured, metrics
 from hbvm_bench.measure.measured import Measured, Series
 from hbvm_bench.reference import solutions
@@ -29,24 +30,25 @@ def records(store: Store) -> list[Record]:
     problems.errors.InputError
         If the directory holds no run.
     """
-    return [up_to_date(store, record) for record in store.records()]
+    known = store.known()
+    return [up_to_date(store, record, known) for record in store.records()]
 
 
-def up_to_date(store: Store, record: Record) -> Record:
+def up_to_date(store: Store, record: Record, known: Known = NOTHING) -> Record:
     """Return a record of a store with its reading: the one that is kept, or a new one, which is then kept."""
     if record.result.outcome not in ("ok", "stalled") or record.result.metrics:
         return record
     try:
-        reference = solutions.digest(make_problem(record.case.problem))
+        reference = solutions.digest(make_problem(record.case.problem, known), known.references)
     except InputError:  # of a plugin that is not here
         return record
     content = msgspec.json.encode([reference, record])
     arrays = (part for named in store.packed_series(record.id).items() for part in named)
     key = kept.key("reading", rule(), content, *arrays)
-    if (known := kept.get(key)) is not None:
-        return with_reading(record, msgspec.json.decode(known, type=Reading))
+    if (there := kept.get(key)) is not None:
+        return with_reading(record, msgspec.json.decode(there, type=Reading))
     try:
-        reread = read(record, store.series(record.id))
+        reread = read(record, store.series(record.id), known)
     except (LookupError, ValueError, TypeError) as error:
         raise InputError(
             f"the arrays of {record.case.method} on {record.case.problem} cannot be read "
@@ -58,9 +60,9 @@ def up_to_date(store: Store, record: Record) -> Record:
     return reread
 
 
-def read(record: Record, series: Series) -> Record:
+def read(record: Record, series: Series, known: Known = NOTHING) -> Record:
     """Return a record with its error growth and metrics, and whether it follows another trajectory."""
-    case_measured = case_of(record, series)
+    case_measured = case_of(record, series, known)
     if case_measured is None:
         return record
     case_measured = measured.with_growth(case_measured, record.case.checks)
@@ -72,7 +74,7 @@ def read(record: Record, series: Series) -> Record:
     return with_reading(record, reading)
 
 
-def case_of(record: Record, series: Series) -> Measured | None:
+def case_of(record: Record, series: Series, known: Known = NOTHING) -> Measured | None:
     """Return what is measured on a case, without error growth; ``None`` where it has no trajectory.
 
     A report has of a case only what is drawn: errors and distances, and not what a worker returned.
@@ -80,15 +82,15 @@ def case_of(record: Record, series: Series) -> Measured | None:
     returned = {"t", "y"} <= {*series} and "distance" not in series
     if record.result.outcome not in ("ok", "stalled") or not returned:
         return None
-    problem = make_problem(record.case.problem)
-    known = solutions.find(problem)
+    problem = make_problem(record.case.problem, known)
+    reference = solutions.find(problem, known.references)
     asked = record.case.ensemble
-    return measured.measure(problem, record.result, series, known, record.timing, ensemble=asked)
+    return measured.measure(problem, record.result, series, reference, record.timing, ensemble=asked)
 
 
-def drawn(record: Record, series: Series) -> Series:
+def drawn(record: Record, series: Series, known: Known = NOTHING) -> Series:
     """Return the series that figures are drawn from: errors, distances and positions beside the states."""
-    case_measured = case_of(record, series)
+    case_measured = case_of(record, series, known)
     return series if case_measured is None else case_measured.series()
 
 

@@ -6,13 +6,13 @@ it, from the same traced vector field as everything else, by two methods that sh
 
 import ast
 import hashlib
-from collections.abc import Sequence
-from contextvars import ContextVar
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Context, Decimal
 from functools import cached_property, lru_cache, partial
 from importlib.resources import files
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import msgspec
@@ -102,29 +102,42 @@ class ReferenceFile(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
         """The SHA-256 of its times and states."""
         return hashlib.sha256(msgspec.json.encode([self.t, self.y])).hexdigest()
 
+    @property
+    def key(self) -> tuple[str, ...]:
+        """What `key_of` says of its problem."""
+        end = float(self.provenance["t_end"]).hex()
+        return (*self.start, *self.parameters, self.provenance["field"], end)
+
+
+References = Mapping[tuple[str, ...], ReferenceFile]
+"""References that do not come with the package, by the keys of their problems."""
+NONE: References = MappingProxyType({})
+
 
 def folder() -> Path:
     """Return where the references that come with the package lie."""
     return Path(str(files("hbvm_bench.reference") / "data"))
 
 
-def find(problem: Problem) -> Reference | None:
+def find(problem: Problem, made: References = NONE) -> Reference | None:
     """Return the reference of a problem, or ``None``.
 
     Parameters
     ----------
     problem : Problem
         Matched by its initial state and its parameters, bit for bit, and its name. Of several
-        references the one that has the problem's end time is returned, or else the first. One that
-        was made here (`know`) is preferred: it has this very span and formula.
+        references the one that has the problem's end time is returned, or else the first.
+    made : mapping, optional
+        References that do not come with the package. One of these is preferred: it has this very span and
+        formula.
     """
-    file = find_file(problem)
+    file = find_file(problem, made)
     return None if file is None else file.reference
 
 
-def find_file(problem: Problem) -> ReferenceFile | None:
+def find_file(problem: Problem, made: References = NONE) -> ReferenceFile | None:
     """Return the reference of a problem with all its digits, or ``None``; see `find`."""
-    if (known := _known.get()) and (file := known.get(_key(problem))) is not None:
+    if made and (file := made.get(key_of(problem))) is not None:
         return file
     wanted, end = (start(problem), hexadecimal(problem.par)), float(problem.t_end).hex()
     stored = _of_name(problem.name or "")
@@ -132,14 +145,14 @@ def find_file(problem: Problem) -> ReferenceFile | None:
     return next((file_ for file_ in fitting if end in file_.t), fitting[0] if fitting else None)
 
 
-def digest(problem: Problem) -> str:
+def digest(problem: Problem, made: References = NONE) -> str:
     """Return the SHA-256 of the times and states of a problem's reference; ``""`` where it has none."""
-    file = find_file(problem)
+    file = find_file(problem, made)
     return "" if file is None else file.digest
 
 
-def add_known(text: str) -> None:
-    """Know a reference that does not come with the package, from its text; see `encode`.
+def decode(text: str) -> ReferenceFile:
+    """Return a reference from its text; see `encode`.
 
     Raises
     ------
@@ -151,27 +164,11 @@ def add_known(text: str) -> None:
         raise ValueError(
             "a reference must have one state, and no or one condition number, for each of its times"
         )
-    said = file.provenance
-    key = (*file.start, *file.parameters, said["field"], float(said["t_end"]).hex())
-    _known.set({**_known.get(), key: file})
+    return file
 
 
-def forget() -> None:
-    """Know the references of the package alone."""
-    _known.set({})
-
-
-def made_here(problem: Problem) -> str:
-    """Return the text of a problem's reference that does not come with the package; ``""`` without one."""
-    file = _known.get().get(_key(problem))
-    return "" if file is None else encode(file)
-
-
-# of the run that this thread works for: two runs may have two references of a problem
-_known: ContextVar[dict[tuple[str, ...], ReferenceFile]] = ContextVar("references", default={})  # noqa: B039
-
-
-def _key(problem: Problem) -> tuple[str, ...]:
+def key_of(problem: Problem) -> tuple[str, ...]:
+    """Return what a reference that was made for a problem belongs to: start, parameters, formula and end."""
     end = float(problem.t_end).hex()
     return (*start(problem), *hexadecimal(problem.par), targets.fingerprint(problem.system), end)
 

@@ -7,7 +7,7 @@ from functools import partial
 
 from msgspec.structs import replace
 
-from hbvm_bench.campaign.identity import make_problem
+from hbvm_bench.campaign.identity import make_problem, printed
 from hbvm_bench.measure.measured import POSITION
 from hbvm_bench.reference import solutions
 from hbvm_bench.report import provenance, words
@@ -21,6 +21,7 @@ from hbvm_bench.report.document import (
     Links,
     Note,
     Notice,
+    Ranked,
     Section,
     attempt,
 )
@@ -156,9 +157,9 @@ def conditions(results: Results) -> Table | None:
     """Return how far doubles determine the positions at the ends, where the references say so."""
     rows = []
     for task in tasks(results.records):
-        problem = make_problem(task.problem)
-        known = solutions.find(problem)
-        if known is not None and (number := known.condition_at(problem.t_end)) is not None:
+        problem = make_problem(task.problem, results.known)
+        found = solutions.find(problem, results.known.references)
+        if found is not None and (number := found.condition_at(problem.t_end)) is not None:
             least = number * solutions.UNIT_ROUNDOFF
             rows.append((task.problem, f"{problem.t_end:g}", f"{number:.1e}", f"{least:.1e}"))
     note = (
@@ -207,14 +208,19 @@ def what_came_out(results: Results) -> Section:
         blocks += _summary(task, members)
     elif len(tables) <= PROBLEMS_SUMMARIZED_AT_TOP:
         blocks += [
-            Section(ranked(task, members).title, _summary(task, members), f"summary-{i}", code=task.problem)
+            Section(
+                _ranked(results, task, members).title,
+                _summary(task, members),
+                f"summary-{i}",
+                code=task.problem,
+            )
             for i, (task, members) in enumerate(tables.items(), 1)
         ]
     else:
         titles = [
             title
             for task, members in tables.items()
-            for title, rows in ranked(task, members).groups
+            for title, rows in _ranked(results, task, members).groups
             for _ in rows
         ]
         counts = Counter(re.split("[,:]", title)[0].lower() for title in titles)
@@ -228,11 +234,15 @@ def all_cases(results: Results) -> list[Block]:
     tables, shown = tasks(results.records), columns(results.records)
     said = [(item.short, item.unit or "–", f"{item.label}. {item.description}") for item in shown]
     meaning = Table("", ("column", "unit", "meaning"), said, words=(0, 1, 2))
-    problems = [ranked(task, members, task.sampled(tables)) for task, members in tables.items()]
+    problems = [_ranked(results, task, members, task.sampled(tables)) for task, members in tables.items()]
     return [
         CaseTable(shown, problems, results.look, numbers(results.records)),
         Details("What the columns mean", [meaning]),
     ]
+
+
+def _ranked(results: Results, task: Task, records: Sequence[Record], sampled: str = "") -> Ranked:
+    return ranked(task, records, make_problem(task.problem, results.known), sampled)
 
 
 def _summary(task: Task, records: Sequence[Record]) -> list[Block]:
@@ -242,7 +252,6 @@ def _summary(task: Task, records: Sequence[Record]) -> list[Block]:
 def problems_in_turn(results: Results) -> list[Section]:
     """Return the section of each problem, with its figures."""
     missing = [case for run in results.runs for case in results.missing(run)]
-    printed = {case.problem: repr(make_problem(case.problem)) for case in missing}  # as the records have it
     tables = tasks(results.records)
     return [
         section(
@@ -251,10 +260,11 @@ def problems_in_turn(results: Results) -> list[Section]:
             [
                 case
                 for case in missing
-                if Task.from_case(replace(case, problem=printed[case.problem])) == task
+                if Task.from_case(replace(case, problem=printed(case.problem))) == task
             ],
             number,
             task,
+            results.known,
             sampled=task.sampled(tables),
             brief=len(tables) > BRIEF_PROBLEMS or len(results.records) > BRIEF_CASES,
             summary=_summary(task, members) if len(tables) > PROBLEMS_SUMMARIZED_AT_TOP else [],
@@ -285,7 +295,8 @@ def every_row(results: Results) -> list[Block]:
 
 def sources(results: Results) -> Section:
     """Return what the problems are from, and how to cite the methods."""
-    references = [text for task in tasks(results.records) for text in make_problem(task.problem).references]
+    made = [make_problem(task.problem, results.known) for task in tasks(results.records)]
+    references = [text for problem in made for text in problem.references]
     return Section("Sources", [Items([*dict.fromkeys(references), CITE])], "sources")
 
 

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from hbvm_bench.campaign.own import NOTHING, Known
 from hbvm_bench.measure import drift, reading
 from hbvm_bench.store.records import Record
 
@@ -22,17 +23,17 @@ DRAWN = ("error.", "guard.", "distance", "position")
 """With what the names of the series begin that have a curve."""
 
 
-def curves(record: Record, series: Mapping[str, Array]) -> dict[str, Array]:
+def curves(record: Record, series: Mapping[str, Array], known: Known = NOTHING) -> dict[str, Array]:
     """Return the curves of a case by name, each of shape (2, n): times and values, at most `POINTS`.
 
     ``curve.growth`` is of shape (4, n): times, rms over the initial conditions, and the percentiles `BAND`.
     """
-    if known := {name: values for name, values in series.items() if name.startswith(PREFIX)}:
-        return known
+    if there := {name: values for name, values in series.items() if name.startswith(PREFIX)}:
+        return there
     if record.case.ensemble is not None:
         return {}
     found: dict[str, Array] = {}
-    drawn = reading.drawn(record, dict(series))
+    drawn = reading.drawn(record, dict(series), known)
     for name, values in drawn.items():
         t = drawn.get("position_t" if name == "position" else "t", np.empty(0))
         if name.startswith(DRAWN) and name != "position_t" and t.size and values.shape == t.shape:

@@ -5,6 +5,8 @@ name of a block is that of a function in `hbvm_bench.report.blocks`; ``./blocks.
 ``table`` of a Python file beside the campaign's.
 """
 
+import functools
+import operator
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
@@ -18,6 +20,7 @@ from numpy.typing import NDArray
 
 from hbvm_bench.campaign import folder
 from hbvm_bench.campaign.file import STUDY, Case, shipped
+from hbvm_bench.campaign.own import NOTHING, Known
 from hbvm_bench.measure import machine, reading
 from hbvm_bench.report import template
 from hbvm_bench.report.curves import PREFIX, curves
@@ -60,6 +63,8 @@ class Results:
         The folder of the campaign's file, where its own blocks are.
     place : str
         The folder of the results as seen from the page; empty where they lie beside it.
+    known : Known
+        What is known of the problems beside their texts.
     """
 
     runs: list[StoredRun]
@@ -68,6 +73,7 @@ class Results:
     computed: dict[str, tuple[Record, Series]] = field(default_factory=dict)
     study: Path | None = None
     place: str = ""
+    known: Known = NOTHING
 
     @cached_property
     def frame(self) -> Frame:
@@ -166,12 +172,10 @@ def gather(stores: Stores, study: Path | None = None, place: str = "") -> Result
         )
     series: dict[str, Series] = {}
     records: list[Record] = []
-    last = None
+    known_of = {id(store): store.known() for store in stores}  # each may have a reference of its own
     for number, (key, (record, store)) in enumerate(furthest.items()):
-        if store is not last:
-            store.add_known()  # of two runs each may have a reference of its own
-            last = store
-        series[key] = _drawn(record, store, named_of[key]) if number < DRAWN_CASES else {}
+        known = known_of[id(store)]
+        series[key] = _drawn(record, store, named_of[key], known) if number < DRAWN_CASES else {}
         records.append(record)
     computed = {
         key: (record, store.series(record.id)) for store in stores for key, record in store.computed().items()
@@ -179,18 +183,19 @@ def gather(stores: Stores, study: Path | None = None, place: str = "") -> Result
     name = indices[0].campaign.name
     if study is None and name in shipped():
         study = shipped()[name].parent
-    return Results(runs, records, series, computed, study, place)
+    known = functools.reduce(operator.or_, known_of.values())
+    return Results(runs, records, series, computed, study, place, known)
 
 
-def _drawn(record: Record, store: Store, named: Sequence[str]) -> Series:
+def _drawn(record: Record, store: Store, named: Sequence[str], known: Known) -> Series:
     """Return the curves of a case, and its series of these names."""
     arrays = store.series(record.id)
     whole = (
-        reading.drawn(record, arrays)
+        reading.drawn(record, arrays, known)
         if named and not any(name.startswith(PREFIX) for name in arrays)
         else arrays
     )
-    return {name: whole[name] for name in named if name in whole} | curves(record, arrays)
+    return {name: whole[name] for name in named if name in whole} | curves(record, arrays, known)
 
 
 def document(stores: Store | Stores, study: Path | None = None) -> Document:

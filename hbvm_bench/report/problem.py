@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from hbvm_bench.campaign.file import Case
 from hbvm_bench.campaign.identity import make_problem
+from hbvm_bench.campaign.own import Known
 from hbvm_bench.measure.observables import observables
 from hbvm_bench.measure.raw import WITNESSES
 from hbvm_bench.reference import solutions
@@ -61,9 +62,9 @@ OVER_TIME = (
 )
 
 
-def ranked(task: Task, records: Sequence[Record], sampled: str = "") -> Ranked:
+def ranked(task: Task, records: Sequence[Record], problem: Problem, sampled: str = "") -> Ranked:
     """Return the rows of one problem; ``sampled`` tells it from another part on it, by its samples."""
-    title = f"{make_problem(task.problem).title}{at_once(task.ensemble)}{sampled}"
+    title = f"{problem.title}{at_once(task.ensemble)}{sampled}"
     return Ranked(title, short_name(task.problem), grouped(rows(records)))
 
 
@@ -81,6 +82,7 @@ def section(
     missing: Sequence[Case],
     number: int,
     task: Task,
+    known: Known,
     *,
     brief: bool,
     summary: Sequence[Block] = (),
@@ -92,16 +94,16 @@ def section(
     series are over its trajectories and not over time: it has rows and no figures. ``brief`` draws only the
     main figures.
     """
-    problem, records = make_problem(task.problem), list(here.record)
+    problem, records = make_problem(task.problem, known), list(here.record)
     unrun = Items([f"`{case.method}`" for case in missing])
     blocks: list[Block] = [
         *summary,
-        *attempt((f"the reference of {task.problem}", partial(_reference, problem))),
+        *attempt((f"the reference of {task.problem}", partial(_reference, problem, known))),
         *([Details(f"{len(missing)} cases on this problem have no result yet", [unrun])] if missing else []),
         *_figures(here, series, number, brief=brief),
         *attempt((f"the shortcomings on {task.problem}", partial(_shortcomings, records, number))),
     ]
-    title = ranked(task, records, sampled).title
+    title = ranked(task, records, problem, sampled).title
     nav = "Figures" * (number == 1)
     return Section(title, blocks, f"problem-{number}", code=short_name(task.problem), nav=nav)
 
@@ -140,31 +142,31 @@ def _shortcomings(records: Sequence[Record], number: int) -> Section:
     return Section("Shortcomings of HBVM and Gauss", [Items(words.shortcomings(records))], f"wrong-{number}")
 
 
-def _reference(problem: Problem) -> Items | None:
+def _reference(problem: Problem, known: Known) -> Items | None:
     """Return what is known of the reference solution, as far as the table's readers want it."""
-    known = solutions.find(problem)
-    if known is None:
+    reference = solutions.find(problem, known.references)
+    if reference is None:
         return None
-    provenance = known.provenance
+    provenance = reference.provenance
     version = f", version {provenance['heyoka']}" if "heyoka" in provenance else ""
     check = f"; {provenance['check']}" if "check" in provenance else ""
     said = [f"Reference: {provenance.get('method', '')}{version}{check}"]
     if "agreement" in provenance:
         said.append(f"The two agree to {provenance['agreement']}")
-    if (number := known.condition_at(problem.t_end)) is not None:
+    if (number := reference.condition_at(problem.t_end)) is not None:
         said.append(
             f"Condition number of the positions at the end: {number:.1e}. A state that is rounded to doubles "
             f"at the worst time changes them by {number * solutions.UNIT_ROUNDOFF:.1e}"
         )
-    floor = problem.errors(known.high, known.t)
+    floor = problem.errors(reference.high, reference.t)
     shown = [name for name in ("energy", "angular_momentum") if name in floor]
     if least := ", ".join(f"{name.replace('_', ' ')} {np.max(floor[name]):.1e}" for name in shown):
         said.append(
             "Errors of the reference solution rounded to doubles, the smallest errors a run can show: "
             f"{least}"
         )
-    if known.t[-1] == problem.t_end:
+    if reference.t[-1] == problem.t_end:
         for label, observable in list(observables(problem).items())[:1]:
-            value = float(observable(known.high[-1:])[0])
+            value = float(observable(reference.high[-1:])[0])
             said.insert(0, f"Reference value of the {label} at t = {problem.t_end:g}: {value:.16g}")
     return Items(said)

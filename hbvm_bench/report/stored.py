@@ -16,8 +16,7 @@ def contents(results: Results, stores: Sequence[Store]) -> Store:
     kept = Store()
     for number, (store, run) in enumerate(zip(stores, results.runs, strict=True), 1):
         kept.run = number
-        store.add_known()
-        kept.write_index(run.index)
+        kept.write_index(run.index, store.known())
         for record in run.records:
             kept.save(record, results.series.get(record.id, {}), compress=False)
         for record in store.computed().values():
@@ -51,7 +50,7 @@ def joined(store: Store, before: Path) -> list[Store]:
 def _with_records(store: Store, records: Sequence[Record]) -> Store:
     """Return a run with some of its records only; those that it lacks then have not run."""
     part = Store()
-    part.write_index(store.index())
+    part.write_index(store.index(), store.known())
     for record in records:
         part.save(record, store.packed_series(record.id))
     return part

@@ -67,8 +67,8 @@ TIMES = (
     "core, in a pass of their own with no other case running. {visits} {sample} The table gives the median "
     "and the quartiles; all samples are in the store. Compile times are given separately. Each library "
     "integrates "
-    "to the end as its own documentation describes; `hbvm-bench run peers` measures what the bench adds to "
-    "its time."
+    "to the end as its own documentation describes; `hbvm-bench run peers` measures what the benchmark adds "
+    "to its time."
 )
 ENDS = "Where the campaign gives the end state, it replaces the 128-bit solution."
 WEAKNESSES_TEXT = """

@@ -21,7 +21,7 @@ from hbvm_bench.campaign.file import (
     name_of,
 )
 from hbvm_bench.campaign.grid import Grid
-from hbvm_bench.campaign.identity import Resolved, is_ours, make_problem
+from hbvm_bench.campaign.identity import Resolved, is_ours, printed
 from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.campaign.sweep import fill
 from hbvm_bench.measure.measured import PLAIN, PREFIXES
@@ -29,6 +29,7 @@ from hbvm_bench.measure.metrics import find
 from hbvm_bench.reference import solutions
 from hbvm_bench.summaries.rows import Task, grouped_by
 from problems.errors import InputError, unknown
+from problems.problem import Problem
 
 LEAST = {"wall_seconds": 0.1, "compile_seconds": 0.1, "memory_gib": 0.1}
 """Under less no case can begin: an interpreter with NumPy alone takes 0.05 GiB."""
@@ -51,13 +52,13 @@ def check(campaign: Campaign, cases: Sequence[Resolved]) -> None:
     _timing(campaign.timing)
     for method in (*campaign.methods, *(item for many in campaign.ensembles for item in many.methods)):
         _settings(method)
-    for many in campaign.ensembles:
-        _ensemble(many)
     _series(campaign.page, cases)
     here = _by_name(campaign, cases)
     for name, those in here.items():
         if not those:
             raise InputError(f"no method takes the problem {name!r}; name it in an only=, or leave it out.")
+    for many in campaign.ensembles:
+        _ensemble(many, here[name_of(many.entry)][0].problem)
     for entry in campaign.entries():
         name = name_of(entry)
         _metrics(entry.within, here[name])
@@ -97,7 +98,7 @@ def _settings(method: MethodEntry) -> None:
             )
 
 
-def _ensemble(many: EnsembleEntry) -> None:
+def _ensemble(many: EnsembleEntry, problem: Problem) -> None:
     if many.spread > 1.0:
         raise InputError(f"spread={many.spread!r} of an ensemble is a share of the start; give at most 1.")
     for method in many.methods:
@@ -106,7 +107,6 @@ def _ensemble(many: EnsembleEntry) -> None:
                 f"only={method.only} of {method.texts[0]} stands in the ensemble of {many.problem}, whose "
                 "methods are its own; leave it out."
             )
-    problem = make_problem(many.problem)
     known = problem.system.unpack(problem.par)
     for name in many.vary:
         if name not in known:
@@ -133,11 +133,11 @@ def _by_name(campaign: Campaign, cases: Sequence[Resolved]) -> dict[str, list[Re
     """Return the cases by what a campaign calls their problems and ensembles."""
     cases_of: dict[str, list[Resolved]] = {}
     there = [
-        (name_of(entry), Task.on(repr(make_problem(fill(entry.use, values))), entry.grid or campaign.grid))
+        (name_of(entry), Task.on(printed(fill(entry.use, values)), entry.grid or campaign.grid))
         for entry in campaign.entries()
         for values in chosen(entry)
     ] + [
-        (name_of(many.entry), Task.on(repr(make_problem(many.problem)), ensemble=many.ensemble))
+        (name_of(many.entry), Task.on(printed(many.problem), ensemble=many.ensemble))
         for many in campaign.ensembles
     ]
     of_task = grouped_by(lambda case: Task.from_case(case.case), cases)

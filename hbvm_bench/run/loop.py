@@ -7,6 +7,7 @@ from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 
 from hbvm_bench.campaign.file import Campaign, Limits
 from hbvm_bench.campaign.identity import Resolved, resolve
+from hbvm_bench.campaign.own import NOTHING, Known
 from hbvm_bench.run.executors import Pool
 from hbvm_bench.run.task import InterruptedRunError, Request, UnfinishedRunError, execute
 from hbvm_bench.store.records import COMPILING, DIED, Record
@@ -17,7 +18,7 @@ ATTEMPTS = 3  # of a case whose process dies, or that an executor loses with the
 PATIENCE = 1.0  # seconds between two looks at how many slots there are
 
 
-def plan(campaign: Campaign) -> list[Resolved]:
+def plan(campaign: Campaign, known: Known = NOTHING) -> list[Resolved]:
     """Return the cases of a campaign, every name and option checked.
 
     Raises
@@ -25,7 +26,7 @@ def plan(campaign: Campaign) -> list[Resolved]:
     problems.errors.InputError
         For the first one that cannot be used, or for a case given twice.
     """
-    cases = [resolve(case) for case in campaign.cases()]
+    cases = [resolve(case, known) for case in campaign.cases()]
     seen: set[str] = set()
     for resolved in cases:
         if resolved.id in seen:

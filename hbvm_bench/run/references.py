@@ -6,21 +6,22 @@ import numpy as np
 
 from hbvm_bench.campaign.file import Campaign, chosen
 from hbvm_bench.campaign.identity import make_problem
+from hbvm_bench.campaign.own import Known
 from hbvm_bench.campaign.sweep import fill
 from hbvm_bench.reference import solutions
 from hbvm_bench.store.store import Store
 from problems.errors import InputError, MissingLibraryError
 
 
-def make_missing(campaign: Campaign, store: Store, tell: Callable[[str], None]) -> bool:
+def make_missing(campaign: Campaign, store: Store, known: Known, tell: Callable[[str], None]) -> Known:
     """Make the references that a campaign asks for and that are not known yet.
 
     Where the campaign gives the end, it is that. Else two computations share nothing but the formula,
     see `hbvm_bench.reference.trusted`; where they differ too early there is none, and the report says
     that no position was measured.
 
-    They are kept in the store; ``tell`` is called with a sentence before and after each. Return whether
-    there are new ones.
+    They are kept in the store; ``tell`` is called with a sentence before and after each. Return what is
+    known then.
 
     Raises
     ------
@@ -29,21 +30,20 @@ def make_missing(campaign: Campaign, store: Store, tell: Callable[[str], None]) 
     problems.errors.InputError
         For an end that is no state of its problem.
     """
-    any_made = False
     for entry in campaign.entries():
         for values in chosen(entry) if entry.reference or entry.end is not None else []:
             text = fill(entry.use, values)
-            problem = make_problem(text)
+            problem = make_problem(text, known)
             if entry.end is not None:
                 given = solutions.of_end(problem, entry.end)
-                if given != solutions.find_file(problem):
-                    solutions.add_known(solutions.encode(given))
-                    store.keep(text)
-                    any_made = True
+                if given != solutions.find_file(problem, known.references):
+                    known |= Known(references={given.key: given})
+                    store.keep(text, known)
                 continue
-            samples = (campaign.grid if entry.grid is None else entry.grid).times(problem)
-            known = solutions.find(problem)
-            if known is not None and known.t.size > 1 and np.isin(known.t, samples).all():
+            grid = campaign.grid if entry.grid is None else entry.grid
+            samples = grid.times(problem, made=known.references)
+            there = solutions.find(problem, known.references)
+            if there is not None and there.t.size > 1 and np.isin(there.t, samples).all():
                 continue
             from hbvm_bench.reference import trusted  # it brings numba, for the few campaigns that ask
 
@@ -55,8 +55,7 @@ def make_missing(campaign: Campaign, store: Store, tell: Callable[[str], None]) 
             except InputError as error:
                 tell(f"{text} has no reference: {error}")
                 continue
-            solutions.add_known(solutions.encode(file))
-            store.keep(text)
+            known |= Known(references={file.key: file})
+            store.keep(text, known)
             tell(f"the two agree to {file.provenance['agreement']}")
-            any_made = True
-    return any_made
+    return known

@@ -141,7 +141,7 @@ def request_of(resolved: Resolved, limits: Limits) -> Request:
         versions=versions_of(method),
         kernel=kernel_digest() if is_ours(method) else "",
     )
-    return Request(rows=[row], limits=limits, beside=own.beside(resolved.problem))
+    return Request(rows=[row], limits=limits, beside=resolved.beside)
 
 
 def execute(request: Request) -> tuple[Record, bytes]:

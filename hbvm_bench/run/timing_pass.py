@@ -10,7 +10,6 @@ from types import MappingProxyType
 
 from msgspec.structs import replace
 
-from hbvm_bench.campaign import own
 from hbvm_bench.campaign.entries import Accuracy, Limits, TimingPlan
 from hbvm_bench.campaign.identity import Resolved
 from hbvm_bench.measure import machine, reading
@@ -55,11 +54,11 @@ def time_cases(
     hbvm_bench.run.task.InterruptedRunError
         If the run was stopped; every problem that was timed is in the store.
     """
-    here = machine.describe(measure=True)
+    here, known = machine.describe(measure=True), store.known()
     with machine.leaving_a_core() as core:
         for group in _missing(cases, store, plan, here):
             tell(group[0][0])
-            read = [reading.up_to_date(store, row) for _, row in group]
+            read = [reading.up_to_date(store, row, known) for _, row in group]
             errors = asked.get(group[0][0].case.problem, ())
             with tempfile.TemporaryDirectory(prefix="hbvm-bench-") as scratch:
                 caches = Path(scratch) if plan.compilations > 1 else None
@@ -143,7 +142,7 @@ def _together(
             rows=[replace(record, result=NO_RESULT, timing=None) for _, record in going],
             limits=together,
             plan=plan,
-            beside=own.beside(going[0][0].problem),
+            beside=going[0][0].beside,
             rounds=numbers,
             compilation=place,
             core=core,

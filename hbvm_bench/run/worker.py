@@ -23,12 +23,11 @@ import numpy as np
 import psutil
 
 from hbvm_bench.campaign import own
-from hbvm_bench.campaign.identity import Resolved, fixed_step, resolve, versions_of
+from hbvm_bench.campaign.identity import Resolved, resolve, versions_of
 from hbvm_bench.measure import batch, ensemble, machine, memory, raw, timing
 from hbvm_bench.measure.computation import VALUE, packed
 from hbvm_bench.measure.raw import Series
 from hbvm_bench.measure.timing import SingleRun, Timeable
-from hbvm_bench.reference import solutions
 from hbvm_bench.run import child
 from hbvm_bench.run.task import Answer, Computation, Request
 from hbvm_bench.store.arrays import NAME, encode
@@ -85,12 +84,11 @@ def _answered(
     request: Request, compiled: Callable[[], None], done: set[tuple[str, str]], cores: Sequence[int]
 ) -> Answer:
     """Do what a request asks; ``done`` are the libraries and problems whose code is loaded."""
-    solutions.forget()
-    own.add_known(request.beside)
     machine.bind(cores if request.core is None else [request.core])
     if request.computation is not None:
         return _stored(*_computed(request.computation))
-    cases = [resolve(row.case) for row in request.rows]
+    known = own.known_from(request.beside)
+    cases = [resolve(row.case, known) for row in request.rows]
     for row, here in zip(request.rows, cases, strict=True):
         if row.id != here.id:
             return Answer(refusal=_difference(row, here))
@@ -150,7 +148,7 @@ def _measure(resolved: Resolved, compiled: Callable[[], None]) -> Measured:
         if bad := [name for name in names if not NAME.fullmatch(name)]:
             reason = f"the invariant's name {bad[0]!r} can be no file name"
             return Result(outcome="refused", reason=reason), {}
-        grid = resolved.case.grid.times(resolved.problem, fixed_step(resolved.method))
+        grid = resolved.times
         program = _compiled(resolved)
         compiled()
         if (asked := resolved.case.ensemble) is not None:

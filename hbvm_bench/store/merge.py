@@ -1,5 +1,7 @@
 """Several runs, from one machine or many, as one."""
 
+import functools
+import operator
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
@@ -58,7 +60,7 @@ def merge(runs: Sequence[Store], out: Store) -> tuple[int, int, int]:
             command=f"hbvm-bench merge {' '.join(places)} --out {shlex.quote(str(out.directory))}",
             cases=list(cases.values()),
         )
-        out.write_index(index)
+        out.write_index(index, functools.reduce(operator.or_, [run.known() for run in runs]))
     return len(cases), written, left_out
 
 

@@ -30,7 +30,6 @@ from numpy.typing import NDArray
 from hbvm_bench.campaign import own
 from hbvm_bench.campaign.file import Campaign, Case, Goal
 from hbvm_bench.campaign.identity import make_problem
-from hbvm_bench.reference import solutions
 from hbvm_bench.store import arrays as packing
 from hbvm_bench.store.files import ensure_writable
 from hbvm_bench.store.records import Record, decoded
@@ -223,31 +222,31 @@ class Store:
         rows = self._rows("SELECT name, data FROM arrays WHERE run=? AND id=? ORDER BY rowid", case_id)
         return {name: data for name, data in rows if packing.NAME.fullmatch(name)}
 
-    def write_index(self, index: Index) -> None:
-        """Store what the run was asked to do, and its problems where they do not come with the package."""
+    def write_index(self, index: Index, known: own.Known = own.NOTHING) -> None:
+        """Store what the run was asked to do, and what is ``known`` of its problems."""
         for text in dict.fromkeys(case.problem for _, case in index.listed()):
             with suppress(InputError):  # of a plugin that is not here
-                self.keep(text)
+                self.keep(text, known)
         with self._writing() as database:
             asked = msgspec.json.encode(index).decode()
             database.execute("INSERT OR REPLACE INTO runs VALUES (?,?)", (self.run, asked))
 
-    def keep(self, text: str) -> None:
-        """Store the formula of a problem of the user's own, and a reference that was made here."""
-        known = own.beside(make_problem(text))
-        if known != own.Beside():
-            row = self.run, text, msgspec.json.encode(known).decode()
+    def keep(self, text: str, known: own.Known) -> None:
+        """Store the formula of a problem of the user's own, and a reference that was made for the run."""
+        beside = known.beside(make_problem(text, known))
+        if beside != own.Beside():
+            row = self.run, text, msgspec.json.encode(beside).decode()
             with self._writing() as database:
                 database.execute("INSERT OR REPLACE INTO problems VALUES (?,?,?)", row)
 
-    def add_known(self) -> None:
-        """Know the problems and references that are stored here, and no other run's; no code is run."""
-        solutions.forget()
-        if self._open is None and not self.path.is_file():
-            return
-        for (text,) in self._rows("SELECT known FROM problems WHERE run=?"):
-            with suppress(ValueError, LookupError, TypeError):  # damaged: whoever needs it says so
-                own.add_known(decoded(text.encode(), own.Beside))
+    def known(self) -> own.Known:
+        """Return the problems and references that are stored here; no code is run."""
+        known = own.NOTHING
+        if self._open is not None or self.path.is_file():
+            for (text,) in self._rows("SELECT known FROM problems WHERE run=?"):
+                with suppress(ValueError, LookupError, TypeError):  # damaged: whoever needs it says so
+                    known |= own.known_from(decoded(text.encode(), own.Beside))
+        return known
 
     def goals(self) -> list[Goal]:
         """Return the goals of the run that is here, with their dates; none where there is no run."""
@@ -267,7 +266,6 @@ class Store:
         rows = self._rows("SELECT asked FROM runs WHERE run=?")
         if not rows:
             raise self._no_run()
-        self.add_known()
         try:
             index = decoded(rows[0][0].encode(), Index)
             cases = index.cases or index.campaign.cases()

@@ -191,7 +191,7 @@ def _timings(record: Record, store: Store) -> Iterator[FrameRow]:
 
 
 def _series(record: Record, store: Store) -> Iterator[FrameRow]:
-    series = reading.drawn(record, store.series(record.id))
+    series = reading.drawn(record, store.series(record.id), store.known())
     for name, values in series.items():
         times = series.get("position_t" if name.startswith(("position", "phase")) else "t", np.empty(0))
         for i, parts in enumerate(values):

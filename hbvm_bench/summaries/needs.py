@@ -19,7 +19,7 @@ from hbvm_bench.summaries.table import Table
 
 SHOWN = 3  # families
 NEAR, NEAR_ERROR, NEAR_MEMORY = 2.0, 10.0, 1.25  # factors to the best cost that count as near it
-_WORSE = {"warm_seconds": "slower", "compile_seconds": "slower", "evaluations": "more", "peak_memory": "more"}
+_WORSE = {"warm_seconds": "slower", "evaluations": "more", "peak_memory": "more"}
 ROUND_OFF = 1e-15  # an error below this is as good as any other
 
 
@@ -66,11 +66,14 @@ def table(records: Sequence[Record]) -> Table | None:
 def needs(records: Sequence[Record]) -> list[Need]:
     """Return the needs, with the measure of work that the run has."""
     work = work_of(records)
-    timed = work == "warm_seconds"
-    cheaply = "least time" if timed else "fewest evaluations (methods that do not count them are left out)"
+    cheaply = (
+        "least time"
+        if work == "warm_seconds"
+        else "fewest evaluations (methods that do not count them are left out)"
+    )
     right, right_8 = _within(position_end=1e-4), _within(position_end=1e-8)
     exact, there = _within(position_end=1e-8, energy_max=1e-13), _within(position_end=1.0)
-    wanted = [
+    return [
         Need(f"position error ≤ 1e-4, {cheaply}", right, work),
         Need(f"position error ≤ 1e-8, {cheaply}", right_8, work),
         Need(f"position error ≤ 1e-8 and energy error ≤ 1e-13, {cheaply}", exact, work),
@@ -94,9 +97,6 @@ def needs(records: Sequence[Record]) -> list[Need]:
         Need("smallest time-reversal error", _within(), "reversal", NEAR_ERROR, ROUND_OFF),
         Need("least memory", _within(), "peak_memory", NEAR_MEMORY),
     ]
-    # seconds taken while other cases ran say nothing
-    soon = [Need("shortest compilation", right, "compile_seconds")] if timed else []
-    return [*wanted, *soon]
 
 
 def factors(records: Sequence[Record], need: Need) -> Mapping[str, list[float]]:

@@ -9,7 +9,7 @@ from statistics import median
 
 from hbvm_bench.campaign.entries import Accuracy
 from hbvm_bench.campaign.file import Campaign, ProblemEntry, chosen, name_of
-from hbvm_bench.campaign.identity import make_problem
+from hbvm_bench.campaign.identity import printed
 from hbvm_bench.campaign.sweep import fill
 from hbvm_bench.measure.timing import Spread, chooses
 from hbvm_bench.store.records import Record
@@ -35,11 +35,11 @@ def entries(campaign: Campaign, records: Sequence[Record]) -> list[tuple[Problem
     tables = tasks(records)
     for entry in campaign.entries():
         for values in chosen(entry):
-            problem = make_problem(fill(entry.use, values))
+            problem = printed(fill(entry.use, values))
             grid = campaign.grid if entry.grid is None else entry.grid
-            result.append((entry, tables.get(Task.on(repr(problem), grid), [])))
+            result.append((entry, tables.get(Task.on(problem, grid), [])))
     for many in campaign.ensembles:
-        task = Task.on(repr(make_problem(many.problem)), ensemble=many.ensemble)
+        task = Task.on(printed(many.problem), ensemble=many.ensemble)
         result.append((many.entry, tables.get(task, [])))
     return result
 
@@ -47,7 +47,7 @@ def entries(campaign: Campaign, records: Sequence[Record]) -> list[tuple[Problem
 def asked(campaign: Campaign) -> dict[str, list[Accuracy]]:
     """Return the errors that a campaign asks for, by itself and by goals, by the problem as it prints."""
     return {
-        repr(make_problem(fill(entry.use, values))): [
+        printed(fill(entry.use, values)): [
             within
             for within in (
                 entry.within,

@@ -103,8 +103,8 @@ def accepted(data, folder):
     try:
         file._check_keys(data, file.Campaign, "spoilt")
         made = file.msgspec.convert(data, file.Campaign)
-        made = own.opened(made, folder, lambda name: None)
-        checked.check(made, loop.plan(made))
+        made, known = own.opened(made, folder, lambda name: None)
+        checked.check(made, loop.plan(made, known))
         computing.plan(made, folder)
     except (InputError, file.msgspec.ValidationError):
         return False

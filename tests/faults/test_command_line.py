@@ -168,8 +168,6 @@ export . -o x.csv                                          | the directory '.' h
 export nowhere -o x.csv --table nosuch                     | unknown table 'nosuch'; known: cases, series,
 export nowhere -o /dev/null/x.csv                          | cannot write to the directory '/dev/null': Not
 export nowhere -o x                                        | 'x' must end in .csv or .parquet
-gallery                                                    | Missing argument 'directory'
-gallery /dev/null/x                                        | cannot write to the directory '/dev/null/x':
 inspect                                                    | Missing argument 'system'
 inspect ""                                                 | an empty formula; write one such as "p^2/2 -
 inspect "p^2/2 - cos(q"                                    | cannot read the formula 'p^2/2 - cos(q': it is

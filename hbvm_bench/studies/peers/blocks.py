@@ -126,10 +126,10 @@ def table(measured: Sequence[Pair]) -> Table:
             )
         )
     return Table(
-        "Each library through this bench, relative to the same library alone",
+        "Each library through this benchmark, relative to the same library alone",
         (
-            *("method", "problem", "bench / alone", "time alone"),
-            *("steps, bench", "steps, alone", "end states differ by"),
+            *("method", "problem", "benchmark / alone", "time alone"),
+            *("steps, benchmark", "steps, alone", "end states differ by"),
         ),
         rows,
         "Median and quartiles of the ratio of CPU times in each round; the two alternate in one process, "

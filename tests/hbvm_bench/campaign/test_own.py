@@ -67,8 +67,12 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-def kept(folder, text=CAMPAIGN):
+def opened(folder, text=CAMPAIGN):
     return own.opened(file.parse(text), folder, lambda _: None)
+
+
+def kept(folder, text=CAMPAIGN):
+    return opened(folder, text)[0]
 
 
 def test_a_function_of_a_file_is_a_problem(folder):
@@ -88,17 +92,19 @@ def test_a_campaign_says_what_it_runs_before_it_does(folder):
 
 
 def test_what_is_kept_is_the_same_problem_without_its_file(folder):
-    first, second = kept(folder).cases()
+    campaign, known = opened(folder)
+    first, second = campaign.cases()
     assert parse_spec(first.problem).arguments == {"g": 1.0}
     (folder / "mine.py").unlink()
-    made, again = make_problem(first.problem), make_problem(second.problem)
+    made, again = (make_problem(case.problem, known) for case in (first, second))
     assert (repr(made), made.par.tolist(), again.par.tolist()) == (first.problem, [1.0], [2.0])
     assert made.errors(np.array([[0.0, 1.0]]))["energy"].tolist() == [0.0]
 
 
 def test_only_what_numbers_depend_on_makes_a_case_stale(folder):
     def ids():
-        return [resolve(case).id for case in kept(folder).cases()]
+        campaign, known = opened(folder)
+        return [resolve(case, known).id for case in campaign.cases()]
 
     before = ids()
     (folder / "mine.py").write_text("'''A text.'''\n" + SWING)
@@ -114,7 +120,7 @@ def test_only_what_numbers_depend_on_makes_a_case_stale(folder):
 def test_a_digest_is_the_same_in_every_process(folder):
     code = (
         "from pathlib import Path\nfrom hbvm_bench.campaign import file, own\n"
-        "print(own.opened(file.load('mine.toml'), Path(), print).cases()[0].problem)"
+        "print(own.opened(file.load('mine.toml'), Path(), print)[0].cases()[0].problem)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split("\n")[1] == kept(folder).cases()[0].problem
@@ -128,13 +134,13 @@ def test_nobody_else_runs_a_file(folder):
 
 
 def test_data_that_are_not_what_their_name_says_are_refused(folder):
-    text = own.formula(kept(folder).cases()[0].problem)
+    text = next(iter(opened(folder)[1].formulas.values()))
     plain = json.loads(text)
     plain["arrays"]["array_0"][1] = 2.0
     with pytest.raises(ValueError, match="not the one that its name says"):
-        own.add_known(own.Beside(formula=json.dumps(plain)))
+        own.known_from(own.Beside(formula=json.dumps(plain)))
     with pytest.raises(ValueError, match="it has no symbol"):  # a text that would be printed into code
-        own.add_known(own.Beside(formula=text.replace('["y", 0]', '["print(1) or y", 0]')))
+        own.known_from(own.Beside(formula=text.replace('["y", 0]', '["print(1) or y", 0]')))
 
 
 @pytest.mark.parametrize(
@@ -225,6 +231,6 @@ def test_a_run_has_positions_where_a_reference_was_asked_for(folder, capsys, mon
 
 def test_a_catalogue_problem_is_opened_by_nobody():
     campaign = file.load("smoke")
-    assert own.opened(campaign, None, pytest.fail) is campaign
-    assert own.find(parse_spec("kepler(e=0.6)")) is None
-    assert own.beside(problems.load("kepler")) == own.Beside()
+    assert own.opened(campaign, None, pytest.fail) == (campaign, own.NOTHING)
+    assert own.NOTHING.problem(parse_spec("kepler(e=0.6)")) is None
+    assert own.NOTHING.beside(problems.load("kepler")) == own.Beside()

@@ -92,7 +92,7 @@ def test_another_reference_changes_positions_and_needs_no_run(toys, tmp_path, mo
     (before,) = reading.records(store)
     known = solutions.find_file(resolve(before.case).problem)
     moved = msgspec.structs.replace(known, y=[["1.5" for _ in row] for row in known.y])
-    monkeypatch.setattr(solutions, "find_file", lambda problem: moved)
+    monkeypatch.setattr(solutions, "find_file", lambda problem, made: moved)
     (now,) = reading.records(store)
     assert now.result.metrics["position_end"].value != before.result.metrics["position_end"].value
     assert now.result.metrics["energy_max"] == before.result.metrics["energy_max"]

@@ -3,6 +3,7 @@ import numpy as np
 import pytest
 
 import problems
+from hbvm_bench.campaign.own import Known
 from hbvm_bench.reference import solutions
 from hbvm_bench.store.store import Store
 from integrators.extended import arithmetic
@@ -86,17 +87,14 @@ def test_a_run_does_not_know_the_reference_of_another_run(tmp_path):
     problem = problems.load("pendulum", q=0.3, t_end=7.0)
     given = {}
     for name, end in (("one", [0.1, 0.2]), ("other", [0.3, 0.4])):
-        solutions.forget()
         given[name] = solutions.of_end(problem, end)
-        solutions.add_known(solutions.encode(given[name]))
         store = Store(tmp_path / name)
         store.prepare()
-        store.keep(repr(problem))
+        store.keep(repr(problem), Known(references={given[name].key: given[name]}))
     none = Store(tmp_path / "none")
     none.prepare()
     for store, expected in ((Store(tmp_path / "one"), given["one"]), (none, None)):
-        store.add_known()
-        assert solutions.find_file(problem) == expected  # before: the last one that anybody had learned
+        assert solutions.find_file(problem, store.known().references) == expected
 
 
 def test_a_rounded_number_is_rounded_in_more_digits_too():

@@ -6,6 +6,7 @@ import pytest
 from hbvm_bench.campaign.file import Campaign, MethodEntry, ProblemEntry
 from hbvm_bench.campaign.grid import Grid
 from hbvm_bench.campaign.identity import make_problem
+from hbvm_bench.campaign.own import NOTHING
 from hbvm_bench.reference import solutions, trusted
 from hbvm_bench.run import references
 from hbvm_bench.store.store import Store
@@ -37,7 +38,7 @@ def test_a_reference_is_computed_at_samples_of_the_run_where_the_stored_one_has_
     )
     store = Store(tmp_path)
     store.prepare()
-    assert not references.make_missing(campaign, store, lambda sentence: None)
+    assert references.make_missing(campaign, store, NOTHING, lambda sentence: None) is NOTHING
     (at,) = asked
     assert np.isin(at, samples).all()
     assert at[0] == samples[0]

@@ -7,15 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from hbvm_bench import cli
+from docs.problem_pages import compile_times, pages, pictures
 from hbvm_bench.campaign.spec import parse_spec
-from hbvm_bench.gallery import compile_times, pages, pictures
 from problems import registry
 from problems.analysis import structure
 from problems.errors import InputError
 
 DOCS = Path(__file__).parents[3] / "docs"
-STALE = "it is out of date: run hbvm-bench gallery docs --no-pictures"
+STALE = "it is out of date: run python -m docs.problem_pages --no-pictures"
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +22,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     directory = tmp_path_factory.mktemp("docs")
     for name in ("problems.md", "engines.md"):
         shutil.copy(DOCS / name, directory)
-    assert cli.main(["gallery", str(directory), "--no-pictures"]) == 0
+    pages.write(directory, with_pictures=False)
     return directory
 
 

@@ -1,6 +1,6 @@
 """Large systems are loops: the code grows with the declared term, not with the number of bodies.
 
-Seconds are on a page of their own, `hbvm-bench gallery docs --compile-times`.
+Seconds are on a page of their own, `python -m docs.problem_pages --compile-times`.
 """
 
 import re

@@ -26,7 +26,7 @@ CASES = (
 )
 LANES = 8
 
-HEAD = """<!-- made by: hbvm-bench gallery docs --compile-times -->
+HEAD = """<!-- made by: python -m docs.problem_pages --compile-times -->
 # From a Hamiltonian to machine code
 
 In `m.sum(term, index)` the term is traced once and stays a loop: the code has the length of the term, however

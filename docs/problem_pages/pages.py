@@ -1,4 +1,4 @@
-"""The pages on problems and engines in docs, from the problems' own docstrings, formulas and data."""
+"""The pages on problems and engines, from the problems' own docstrings, formulas and data."""
 
 import inspect
 import re
@@ -7,7 +7,7 @@ from pathlib import Path
 from textwrap import dedent
 
 import problems
-from hbvm_bench.gallery import pictures
+from docs.problem_pages import pictures
 from hbvm_bench.reference import solutions as reference
 from hbvm_bench.report.markdown import printed
 from hbvm_bench.store.files import write_all
@@ -18,7 +18,7 @@ from problems.errors import InputError
 from problems.problem import Problem
 from problems.targets.latex import latex
 
-BEGIN, END = "<!-- made by: hbvm-bench gallery docs -->", "<!-- end of what is made -->"
+BEGIN, END = "<!-- made by: python -m docs.problem_pages -->", "<!-- end of what is made -->"
 """Between them stands what is made; all else on a page is written by hand and stays."""
 
 
