@@ -34,11 +34,9 @@ SEPARATE = {
     for module, commands in {
         "about": ("advise", "engines", "inspect"),
         "doctor": ("doctor", "warm"),
-        "paper": ("paper",),
         "reports": ("report",),
-        "run": ("run",),
+        "run": ("run", "automatic", "endure", "paper", "race"),
         "stores": ("compare", "export", "merge"),
-        "studies": ("automatic", "endure", "race"),
     }.items()
     for command in commands
 }
@@ -70,7 +68,12 @@ def attach(arguments: Sequence[str] = ()) -> None:
         return
     # all of them for --help, and for the suggestions where there is no such command
     for name in [asked] if asked in SEPARATE else sorted(SEPARATE.keys() - present):
-        app.command(name)(getattr(import_module(SEPARATE[name]), name))
+        module = import_module(SEPARATE[name])
+        if hasattr(module, name):
+            app.command(name)(getattr(module, name))
+        else:
+            said = f"Run the campaign {name}, as `hbvm-bench run {name}`, with its report beside the results."
+            app.command(name, help=said)(module.run)
 
 
 def _fail(sentence: str) -> int:

@@ -1,5 +1,6 @@
-"""The command ``hbvm-bench run``."""
+"""``hbvm-bench run``, and the campaigns that are commands too: ``race | endure | automatic | paper``."""
 
+import os
 import shlex
 import sys
 from datetime import UTC, datetime
@@ -14,10 +15,11 @@ from msgspec.structs import replace
 from hbvm_bench.campaign import own
 from hbvm_bench.campaign.file import Campaign, Goal, Grid, MethodEntry, ProblemEntry, file_of, load
 from hbvm_bench.campaign.identity import Resolved, make_method
-from hbvm_bench.campaign.shorter import quick_run
+from hbvm_bench.campaign.shorter import chosen, quick_run, with_rounds
 from hbvm_bench.campaign.spec import file_of as python_file_of
+from hbvm_bench.commands.listing import as_json as run_as_json
 from hbvm_bench.commands.live import Live
-from hbvm_bench.measure import reading
+from hbvm_bench.measure import machine, reading
 from hbvm_bench.report import terminal
 from hbvm_bench.run import checked, child, computing, executors, loop, references, timing_pass
 from hbvm_bench.run.executors import Pool
@@ -27,6 +29,8 @@ from hbvm_bench.store.store import Index, Store
 from hbvm_bench.summaries import standings
 from problems.errors import InputError
 
+COMMANDS = ("automatic", "endure", "paper", "race")
+"""Campaigns by which this command is called too: it then writes the report beside the results."""
 UNFINISHED = 1
 INTERRUPTED = 130
 ANYHOW = ("as_json", "executor", "jobs", "report_to", "timing")  # options that change no number
@@ -40,7 +44,11 @@ def run(
     ] = None,
     problem: Annotated[
         list[str] | None,
-        typer.Option("-p", "--problem", help='A problem, as in "sitnikov(e=0.6)" or "mine.py:swing(g=1.1)".'),
+        typer.Option(
+            "-p",
+            "--problem",
+            help='A problem, as in "sitnikov(e=0.6)" or "mine.py:swing(g=1.1)"; of a campaign, its name.',
+        ),
     ] = None,
     method: Annotated[
         list[str] | None, typer.Option("-m", "--method", help='A method, as in "HBVM(k=16, s=8, h=0.25)".')
@@ -74,23 +82,33 @@ def run(
             "--quick", help="A tenth of the integration intervals and trajectories, few settings and rounds."
         ),
     ] = False,
+    rounds: Annotated[int | None, typer.Option(min=2, help="Number of interleaved timing rounds.")] = None,
+    avx2: Annotated[bool, typer.Option("--avx2", help=machine.AVX2)] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print all results as JSON.")] = False,
 ) -> None:
     """Run a campaign, or the given problems and methods; a second run computes only what is missing.
 
     Exit code 0 when every case has a row, 1 when an executor lost one or its process died three times,
     130 for Ctrl-C.
     """
+    beside = str(context.info_name) in COMMANDS
+    if beside:
+        if name is not None:
+            raise InputError(f"hbvm-bench {context.info_name} is a campaign; leave out {name!r}.")
+        name = str(context.info_name)
     campaign = _campaign(name, problem, method, step, reference)
-    campaign = quick_run(campaign) if quick else campaign
+    campaign = with_rounds(quick_run(campaign) if quick else campaign, rounds)
     campaign, known = opened(campaign, name)
     study = None if name is None else file_of(name).parent
+    out = out or Path("runs") / (campaign.name + "-quick" * quick + "-avx2" * avx2)
+    report_to = report_to or (out / "report" if beside else None)
     if report_to is not None or (study is not None and (study / "page.md").is_file()):
         from hbvm_bench.report.page import check  # what draws costs seconds to import
 
         check(study)
     if report_to is not None:
-        ensure_writable(report_to, keep=False)
-    out = out or Path("runs") / (campaign.name + "-quick" * quick)
+        ensure_writable(out if beside else report_to, keep=False)
+    os.environ |= machine.restricted_to_avx2() if avx2 else {}  # of the processes that measure
     store = carry_out(
         campaign,
         out,
@@ -99,14 +117,17 @@ def run(
         executor=executor,
         jobs=jobs,
         timing=timing,
-        whole=True,
+        whole=name is None or not problem,
         known=known,
     )
-    show(campaign, store)
+    if as_json:
+        terminal.print_json(run_as_json(store.index(), reading.records(store)))
+    else:
+        show(campaign, store)
     if report_to is not None:
         from hbvm_bench.commands.publishing import report_on
 
-        report_on([store], report_to, study, stderr=False)
+        report_on([store], report_to, study, stderr=as_json)
     refuse_died(store)
 
 
@@ -262,9 +283,9 @@ def _campaign(
     reference: bool,
 ) -> Campaign:
     if name is not None:
-        if problems or methods or step is not None or reference:
-            raise InputError("give either a campaign or -p, -m, --step and --reference, not both.")
-        return load(name)
+        if methods or step is not None or reference:
+            raise InputError("give either a campaign or -m, --step and --reference, not both.")
+        return chosen(load(name), problems or [])
     if not problems or not methods:
         raise InputError('give a campaign, or at least one -p "PROBLEM(...)" and one -m "METHOD(...)".')
     if step is not None and not 0 < step < float("inf"):

@@ -53,7 +53,7 @@ run sitnikov --jobs 0                                      | Invalid value for '
 run sitnikov --jobs -1                                     | Invalid value for '--jobs': Input should be
 run sitnikov --jobs a                                      | Invalid value for '--jobs': Input should be a
 run sitnikov --jobs 1.5                                    | Invalid value for '--jobs': Input should be a
-run sitnikov --step 1                                      | give either a campaign or -p, -m, --step and
+run sitnikov --step 1                                      | give either a campaign or -m, --step and
 run sitnikov --executor nowhere                            | there is no executor 'nowhere'; give local,
 RUN --executor nowhere                                     | there is no executor 'nowhere'; give local,
 RUN --executor no.such:thing                               | there is no executor 'no.such:thing': No module
@@ -70,7 +70,7 @@ RUN --step 1e-320                                          | the limit is
 RUN --step 0                                               | --step must be a positive number, not 0.0
 RUN --step inf                                             | --step must be a positive number, not inf
 RUN --step abc                                             | Invalid value for '--step': Input should be a
-RUN --timing yes                                           | give either a campaign or -p, -m, --step and
+RUN --timing yes                                           | give either a campaign or -m, --step and
 RUN -p "kepler()"                                          | HBVM(k=4, s=2, h=0.1) on kepler(e=0.6) is given
 run -p "kepler()" -m ""                                    | an empty specification; write a name or a call
 run -p "" -m "IAS15()"                                     | an empty specification; write a name or a call
@@ -131,7 +131,7 @@ reference "kepler(e=0.61)" --until a                       | Invalid value for '
 reference "kepler(e=0.61)" --until 0                       | until=0.0 must lie between 0.0 and
 reference "kepler(e=0.61)" --until 1 -o /dev/null/x/y      | cannot write to the directory '/dev/null/x':
 reference "kepler(e=0.61)" --until 1 -o /proc/y            | cannot write to the directory '/proc': No such
-automatic nosuch                                           | Got unexpected extra argument(s) (nosuch)
+automatic nosuch                                           | hbvm-bench automatic is a campaign; leave out
 automatic -p nosuch                                        | unknown problem of automatic 'nosuch'; known:
 automatic --rounds 0                                       | Invalid value for '--rounds': Input should be
 automatic --rounds a                                       | Invalid value for '--rounds': Input should be
@@ -141,12 +141,12 @@ race --rounds 1                                            | Invalid value for '
 race --rounds 0                                            | Invalid value for '--rounds': Input should be
 race --rounds a                                            | Invalid value for '--rounds': Input should be a
 race --quick --out /dev/null/x                             | cannot write to the directory '/dev/null/x':
-race extra                                                 | Got unexpected extra argument(s) (extra)
+race extra                                                 | hbvm-bench race is a campaign; leave out
 endure --years 1                                           | No such option: --years
 endure --starts 0                                          | No such option: --starts
-endure -m "Leapfrog(h=0.1)"                                | No such option: -m
+endure -m "Leapfrog(h=0.1)"                                | give either a campaign or -m, --step and
 endure --quick --out /dev/null/x                           | cannot write to the directory '/dev/null/x
-paper nosuch                                               | Got unexpected extra argument
+paper nosuch                                               | hbvm-bench paper is a campaign; leave out
 paper --jobs 0                                             | Invalid value for '--jobs': Input should be
 paper --jobs a                                             | Invalid value for '--jobs': Input should be a
 paper --out /dev/null/x                                    | cannot write to the directory

@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from hbvm_bench import cli
+from hbvm_bench.campaign.own import NOTHING
 from hbvm_bench.commands import run
 from hbvm_bench.measure.metrics import METRICS
 from hbvm_bench.store.store import Store
@@ -130,7 +131,7 @@ def test_the_command_that_is_kept_has_no_folder_of_this_machine(
 ):
     other, commands = tmp_path_factory.mktemp("other"), []
     monkeypatch.setattr(run, "carry_out", lambda campaign, out, command, **_: commands.append(command))
-    monkeypatch.setattr(run, "opened", lambda campaign, name: campaign)
+    monkeypatch.setattr(run, "opened", lambda campaign, name: (campaign, NOTHING))
     for name in ("show", "refuse_died"):
         monkeypatch.setattr(run, name, lambda *_: None)
     (here / "in").mkdir()

@@ -29,8 +29,7 @@ def pages(directory, command):
 def test_a_study_and_its_campaign_draw_the_same_bytes(name, problem, quick, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     campaign = chosen(load(name), [problem])
-    for module in ("studies", "run"):
-        monkeypatch.setattr(f"hbvm_bench.commands.{module}.load", lambda asked: campaign)
+    monkeypatch.setattr("hbvm_bench.commands.run.load", lambda asked: campaign)
     place = Path("runs") / (name + "-quick" * bool(quick))
     made_up_run.finish(Store(place), quick_run(campaign) if quick else campaign)
     assert main([name, *quick]) == 0
