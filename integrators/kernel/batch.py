@@ -10,7 +10,7 @@ its start; so does one with adaptive steps whose field has a discontinuity.
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from threading import Event
 from typing import Any, Protocol, Self
@@ -27,6 +27,7 @@ from integrators.kernel.ensemble.prepared import Lanes
 from integrators.kernel.pace import Pace
 from integrators.kernel.plan import Plan
 from integrators.kernel.stepper import HBVMStepper
+from integrators.kernel.tangent.lanes import VectorLanes
 from integrators.options import Count
 from integrators.protocol import Array, Samples, Status, Trajectories, UserError, telling
 from integrators.refusals import check_batch, check_times
@@ -38,6 +39,9 @@ from problems.problem import System
 CHUNK = 1 << 14  # steps between two looks at Ctrl-C, at most
 JOBS = 8  # for each thread, at least, where there are so many groups: for even loads
 SAMPLINGS = ("partial", "stop", "dense")
+
+Directions = tuple[Array, Array]
+"""Parts of tangent vectors in the states, shape (n, dim, k), and in the parameters, (n, n_par, k)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -312,3 +316,46 @@ class Adaptive(_InLanes):
     @property
     def steps(self) -> Counts:
         return self.arrays["all_steps"]
+
+
+def batch_along(
+    program: BatchProgram, lanes: VectorLanes, Y0: ArrayLike, par: ArrayLike | None, times: ArrayLike,
+    t0: float, directions: Directions, threads: int,
+) -> Batch:  # fmt: skip
+    """Integrate every start, and the vectors along it, to all times. See `HBVMProgram.batch_along`.
+
+    They are a batch of trajectories of a larger system.
+    """
+    threads = checked("a batch", "threads", threads, Count)
+    grid = check_times(times, t0)
+    starts, parameters = check_batch(Y0, par, grid, program.system)
+    larger = nothing_yet(grid, len(starts), lanes.dim)
+    joined = lanes.join(starts, directions[0]), lanes.join_parameters(parameters, directions[1])
+    work = _WorkAlong(
+        program, larger, *joined, t0, "partial", threads, larger=lanes, single=(starts, parameters),
+        directions=directions,
+    )  # fmt: skip
+    work.run(Fixed.planned(lanes, work))
+    y, vectors = lanes.split(larger.y)
+    return replace(larger, y=y, variations=vectors)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _WorkAlong(Work):
+    """A batch of the larger system; what leaves its lane is integrated by a stepper with tangent vectors."""
+
+    larger: VectorLanes
+    single: tuple[Array, Array]
+    directions: Directions
+
+    def started(self, i: int) -> HBVMStepper:
+        """Return a stepper at the start of a trajectory, with its vectors."""
+        starts, parameters = self.single
+        stepper = self.program.start(starts[i], parameters[i], self.t0)
+        stepper.follow(*(part[i] for part in self.directions))
+        return stepper
+
+    def states(self, stepper: HBVMStepper, samples: Samples) -> Array:
+        """Return samples and the vectors there as states of the larger system."""
+        assert stepper.variations is not None
+        return self.larger.join(np.asarray(samples.y), stepper.variations)

@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike
 from integrators.events.event import Event
 from integrators.kernel import routes, tables
 from integrators.kernel.adaptive import Adaptive
-from integrators.kernel.along import batch_along
-from integrators.kernel.batch import Batch, prepare_batch
+from integrators.kernel.batch import Batch, batch_along, prepare_batch
 from integrators.kernel.batch_events import WithEvents
 from integrators.kernel.context import Context, Shape, blocks
 from integrators.kernel.engines import iterations, look, solver, steps

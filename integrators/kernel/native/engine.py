@@ -70,7 +70,7 @@ class Engine:
         function = getattr(import_module(self._module), self._name)
         return function, [(types.int64, "i64")] * len(self._arguments), "i64"
 
-    @property
+    @cached_property
     def key(self) -> str:
         """What the machine code is kept by: the function, and the sources of all that is in it."""
         return store.key("engine", self._module, self._name, binary.sources(self._module))

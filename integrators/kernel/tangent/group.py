@@ -66,7 +66,8 @@ class Group:
             fresh[count, moves] = self._new_context()
         self.own, self.partial = (fresh[count, moves].copy() for _ in contexts)
         for context, base in zip((self.own, self.partial), contexts, strict=True):
-            context.point_to(base.used_tables)
+            if not base.varying:  # else all have the same
+                context.point_to(base.used_tables)
             solver, rule = context.solver, base.solver
             solver.tolerance, solver.stagnation = rule.tolerance, rule.stagnation
             solver.log_residual, solver.rate, context.varying = rule.log_residual, FIRST_RATE, base.varying
