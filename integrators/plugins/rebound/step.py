@@ -10,7 +10,7 @@ and velocities ``V_l = v + h sum_m A_lm a_m`` where forces depend on them. Nodes
 weights come as hi + lo pairs, displacements are formed before the position is
 added, and positions and velocities carry along what their last addition rounded off.
 
-The kernel's own steps cannot be used: REBOUND evaluates the forces of one stage at a time, at positions,
+The steps of the kernel cannot be used: REBOUND evaluates the forces of one stage at a time, at positions,
 velocities and a time that lie in its particles, and may add or remove bodies between two steps. The order of
 the error, the error that is estimated and what ends the iteration are the kernel's
 (`integrators.kernel.tolerance`, `integrators.plugins.rule`).
