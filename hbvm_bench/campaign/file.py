@@ -274,10 +274,6 @@ def parse(text: str, source: str = "campaign") -> Campaign:
         raise InputError(f"{source}: {message}.") from None
 
 
-def _tables(listed: Any) -> list[dict[str, Any]]:
-    return [item for item in listed if isinstance(item, dict)] if isinstance(listed, list) else []
-
-
 def _check_keys(data: dict[str, Any], struct: type[msgspec.Struct], source: str) -> None:
     for key, value in data.items():
         if key not in struct.__struct_fields__:

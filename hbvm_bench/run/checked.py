@@ -61,7 +61,7 @@ def check(campaign: Campaign, cases: Sequence[Resolved]) -> None:
         _ensemble(many, here[name_of(many.entry)][0].problem)
     for entry in campaign.entries():
         name = name_of(entry)
-        _metrics(entry.within, here[name])
+        _metrics(entry.within)
         if entry.end is not None:
             solutions.of_end(here[name][0].problem, entry.end)
         if not campaign.quick:  # which shortens the spans and keeps the grids
@@ -158,7 +158,7 @@ def _grid(grid: Grid, name: str, cases: Iterable[Resolved]) -> None:
                 )
 
 
-def _metrics(keys: Iterable[str], cases: Sequence[Resolved]) -> None:
+def _metrics(keys: Iterable[str]) -> None:
     for metric in map(find, keys):
         if metric.better is None:
             raise InputError(
@@ -167,7 +167,7 @@ def _metrics(keys: Iterable[str], cases: Sequence[Resolved]) -> None:
 
 
 def _goal(goal: Goal, campaign: Campaign, cases: Sequence[Resolved]) -> None:
-    _metrics((goal.metric, *goal.within, *goal.no_worse), cases)
+    _metrics((goal.metric, *goal.within, *goal.no_worse))
     if goal.metric in TIMES and not campaign.timing.rounds:
         raise InputError(f"a goal asks for {goal.metric}, and timing has rounds = 0; take some.")
     if goal.at is not None and goal.no_worse:

@@ -41,21 +41,7 @@ EXCLUDED = "_void"  # how the column ends that says whether a metric must not be
 
 
 def frame(stores: Sequence[Store], table: str = "cases") -> Frame:
-    """Return the results of runs as a data frame.
-
-    Parameters
-    ----------
-    stores : sequence of Store
-        The runs, one after the other.
-    table : {"cases", "timings", "series"}
-        A row per case, with its metrics, settings, versions and times; per sample of the timing pass; or
-        per number of its arrays.
-
-    Raises
-    ------
-    problems.errors.InputError
-        For another table, or a place without a run.
-    """
+    """Return the results of runs, one after the other: see `hbvm_bench.summaries.results.Results.frame`."""
     if table not in TABLES:
         raise unknown("table", table, TABLES)
     rows = [

@@ -2,6 +2,7 @@
 
 import base64
 import gzip
+import re
 
 import msgspec
 import numpy as np
@@ -10,13 +11,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hbvm_bench.campaign.file import Campaign, MethodEntry, shipped
+from hbvm_bench.commands.publishing import report_on
+from hbvm_bench.measure.metrics import METRICS
 from hbvm_bench.report import pack
+from hbvm_bench.report.blocks import all_cases
 from hbvm_bench.report.document import Details
 from hbvm_bench.report.figures.canvas import new
 from hbvm_bench.report.figures.plots import numbers
-from hbvm_bench.report.index import CHECKS, not_measured, write_index
+from hbvm_bench.report.index import CHECKS, not_measured, write_index, write_pages
 from hbvm_bench.report.markdown import markdown
-from hbvm_bench.report.page import document, gather
+from hbvm_bench.report.page import document, gather, page_of
+from hbvm_bench.report.write import TEXT, rendered
 from hbvm_bench.store.merge import merge
 from hbvm_bench.store.records import Load, Result, Timing
 from hbvm_bench.store.store import Index, Store
@@ -74,6 +79,29 @@ def test_a_report_keeps_of_a_case_what_merge_keeps(tmp_path):
     merge([first, second], out)
     assert kept.result.outcome == "ok"
     assert kept == out.load(measured.id)
+
+
+def test_a_report_explains_the_columns_that_it_has_and_has_a_file_for_every_picture_that_it_names(tmp_path):
+    content = gather([made_up_run.write(Store(tmp_path), ["pendulum(p=1.0)"], 4)])
+    table, meaning = all_cases(content)
+    assert [row[0] for row in meaning.blocks[0].rows] == [metric.short for metric in table.columns]
+    assert 3 < len(table.columns) < len(METRICS) / 2
+    files = rendered(page_of(content))
+    named = re.findall(r"!\[[^\]]*\]\(([^)]+)\)", files[TEXT].decode())
+    assert named
+    assert {*named} == {name for name in files if name.endswith(".svg")}
+
+
+def test_a_picture_that_lies_in_a_report_is_drawn_anew_with_its_page(tmp_path):
+    store = made_up_run.write(Store(tmp_path / "run"), ["pendulum(p=1.0)"], 3)
+    report_on([store], tmp_path / "reports" / "one")
+    pictures = [*(tmp_path / "reports" / "one" / "figures").glob("*.svg")]
+    drawn = {path: path.read_bytes() for path in pictures}
+    assert drawn
+    for path in pictures:
+        path.write_text("<svg/>")  # as of code that has changed since
+    assert len([*write_pages(tmp_path / "reports")]) == 1
+    assert {path: path.read_bytes() for path in pictures} == drawn
 
 
 def test_what_is_missing_is_named(tmp_path):

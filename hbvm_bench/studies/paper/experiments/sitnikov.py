@@ -29,13 +29,6 @@ STEPS = (1 / 32, 1 / 16, 1 / 12, 0.1, 1 / 8, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.
 STEPS_SHORT = (1 / 32, 1 / 16, 1 / 8, 1 / 4, 1 / 2)
 NEIGHBOURS = 32
 REVOLUTIONS = (1, 16, 31)  # drawn as lines, to see the ellipses turn
-TRIALS = (
-    ("Gauss, s = 2, h = 1/8", Gauss(s=2, h=1 / 8)),
-    ("HBVM(18,2), h = 1/2", HBVM_18),
-    ("HBVM(18,2), h = 1/8", HBVM(k=18, s=2, h=1 / 8)),
-    ("HBVM(18,4), h = 1/4", HBVM(k=18, s=4, h=1 / 4)),
-    ("HBVM(16,8), h = 1/8", TRUTH),
-)
 
 
 @dataclass(frozen=True, eq=False)
