@@ -2,12 +2,10 @@
 
 import os
 import re
-import shutil
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, requires, version
-from importlib.util import find_spec
 from pathlib import Path
 from statistics import median, quantiles
 from typing import Literal
@@ -37,7 +35,6 @@ WITHOUT = {
     "export": "export writes CSV only",
 }
 """What happens without the libraries of an optional extra."""
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 
 
 @dataclass(frozen=True)
@@ -54,7 +51,7 @@ def examine(*, calibration: bool = True) -> dict[str, list[Finding]]:
     """Return what is ``"installed"`` and what ``"timings"`` depend on; the calibration takes a second."""
     timings = [cores(), load(), governor(), boost(), vectors(), virtual()]
     return {
-        "installed": [python(), *libraries(), *methods(), browser()],
+        "installed": [python(), *libraries(), *methods()],
         "timings": [*timings, *(steadiness() if calibration else [])],
     }
 
@@ -116,16 +113,6 @@ def methods() -> list[Finding]:
             if library.lower() not in known:
                 findings.append(Finding(name, "ok", f"{library} {version_of(library)}"))
     return findings
-
-
-def browser() -> Finding:
-    """Return whether the browser is there that the tests look at reports with."""
-    if path := next((path_ for name in BROWSERS if (path_ := shutil.which(name))), None):
-        return Finding("browser", "ok", Path(path).name)
-    if find_spec("playwright") is None:
-        return Finding("browser", "note", "none; only the tests of this project use one")
-    words = "no chromium: the tests that look at reports in a browser are skipped"
-    return Finding("browser", "note", words, "install chromium if you work on this project")
 
 
 def cores() -> Finding:

@@ -45,20 +45,6 @@ KINDS: dict[str, str] = {
 CURVES = [kind for kind in KINDS if kind != "drift"]  # that are fitted; a drift is told by the mean
 
 
-def curve(growth: ErrorGrowth, t: ArrayLike) -> Array:
-    """Return the fitted growth at positive times since the start, shape (n,); NaN where there is none."""
-    times = np.asarray(t, dtype=np.float64)
-    if growth.kind is None:
-        return np.full(times.shape, math.nan)
-    if growth.kind == "exponential":
-        rate = math.nan if growth.exponential_rate is None else growth.exponential_rate
-        grown = np.exp(np.minimum(rate * (times - growth.end), 0.0))
-    else:
-        slope = 0.0 if growth.kind == "bounded" else math.nan if growth.slope is None else growth.slope
-        grown = (times / growth.end) ** slope
-    return np.hypot(growth.floor, growth.reached * grown)
-
-
 def drifts(growth: ErrorGrowth) -> bool | None:
     """Whether the mean is more than `limit` standard errors from 0; ``None`` for one trajectory."""
     if growth.mean is None or growth.mean_error is None:

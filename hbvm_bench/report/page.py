@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from hbvm_bench.campaign import folder
 from hbvm_bench.campaign.file import STUDY, Case, shipped
 from hbvm_bench.campaign.own import NOTHING, Known
-from hbvm_bench.measure import machine, reading
+from hbvm_bench.measure import reading
 from hbvm_bench.report import template
 from hbvm_bench.report.curves import PREFIX, curves
 from hbvm_bench.report.document import Block, Document
@@ -89,14 +89,6 @@ class Results:
         """Return the cases of a run that have no result yet."""
         there = {record.id for record in self.records}
         return [case for number, case in run.index.listed() if number not in there]
-
-    @cached_property
-    def by_processor(self) -> dict[str, list[StoredRun]]:
-        """The runs by the kind of processor, by its name."""
-        runs_of: dict[str, list[StoredRun]] = {}
-        for run in self.runs:
-            runs_of.setdefault(machine.kind(run.machine), []).append(run)
-        return dict(sorted(runs_of.items()))
 
 
 def find(name: str, study: Path | None = None) -> BlockMaker:

@@ -34,16 +34,6 @@ class StoredRun(msgspec.Struct, frozen=True, kw_only=True):
         return (timed or [record.machine for record in records])[0]
 
     @property
-    def versions(self) -> dict[str, str]:
-        """Of all libraries."""
-        return {name: number for record in self.records for name, number in record.versions.items()}
-
-    @property
-    def started(self) -> str:
-        """When the first of its cases had ended."""
-        return min(record.finished for record in self.records)
-
-    @property
     def command(self) -> str:
         """How to run it again."""
         return self.index.command

@@ -44,10 +44,6 @@ METHODS = {
 }
 OTHERS = (("#a8324a", "#ff8a9e", "8"), ("#3d6b1f", "#a5d677", "8"), ("#7a4a1e", "#e0a46a", "8"))
 
-DASHES: tuple[tuple[float, ...], ...] = (
-    *((), (6, 2), (2, 1.6), (8, 2, 2, 2)),
-    *((5, 1.5, 1.5, 1.5, 1.5, 1.5), (12, 3)),
-)
 # Neutral colours of the figures; each is unique so that it can be themed in the page.
 INK = "#1d2430"
 MUTED = "#5c6674"

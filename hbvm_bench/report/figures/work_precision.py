@@ -44,9 +44,7 @@ def work_precision(here: Frame, key: str, end: str = "") -> Picture | None:
     look = looks(shown)
     figure = new(WIDTH, 5.8 if conserved else 3.2)
     seconds = [_number(record, TIME) for family in shown for record in families[family]]
-    places = (
-        ((0.12, 0.56, 0.64, 0.395), (0.12, 0.08, 0.64, 0.395)) if conserved else ((0.12, 0.15, 0.64, 0.74),)
-    )
+    places = BOTH if conserved else ALONE
     for place, (metric, title) in zip(places, PANELS[-len(places) :], strict=True):
         axes = figure.add_axes(place)
         errors = [_height(record, metric) for family in shown for record in families[family]]

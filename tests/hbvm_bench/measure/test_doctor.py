@@ -14,7 +14,7 @@ from hbvm_bench.measure import doctor, machine
 def test_everything_that_is_installed_has_its_version():
     found = {one.subject: one for one in doctor.examine(calibration=False)["installed"]}
     peers = {"heyoka", "rebound", "diffrax", "pyhamsys", "scikit-sundae", "pynamicalsys", "jax"}
-    assert {"hbvm-bench", "distributed", "pyarrow", "browser"} | peers == found.keys()
+    assert {"hbvm-bench", "distributed", "pyarrow"} | peers == found.keys()
     assert all(one.observed for one in found.values())
     assert found["hbvm-bench"].state == "ok"
 
