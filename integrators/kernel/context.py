@@ -147,6 +147,7 @@ class Context(Memory):
     line = Pointer()
     follow = Pointer()  # int64(operation, context, memory), which vectors follow the steps by; 0: none
     follow_memory = Pointer()
+    team = Pointer()  # threads that share the work, a `integrators.kernel.parts.team.Team`; 0: none
     parameters = Integer()
     par = Array("parameters")
     rows = Integer()  # components of a stage: dof in second-order form, dim in first-order form

@@ -24,6 +24,9 @@ triangular = Engine(
 )
 """Solve with sparse factors; see `integrators.kernel.implicit.triangular`."""
 
+work = Engine("step.work", "work", "team helper")
+"""Pieces of the jobs of a team of threads; its address is what `integrators.kernel.step.share` calls."""
+
 line = Engine("line.entry", "entry", "operation ctx")
 """Line integrals; its address is what the steps call where there is a `Context.line`."""
 

@@ -86,7 +86,7 @@ class HBVMProgram(Compiled):
         self.constants = tables.constants(plan.k, plan.s, self.second, lanes)
         self.kept = None if plan.keep is None else Kept(system, self.constants, plan.keep)
         quantity = self.kept.values if self.kept else "force" if self.second else "field"
-        self.field = field_of(system, quantity, lanes)
+        self._quantity, self.field = quantity, field_of(system, quantity, lanes)
         kernel = steps.code()
         block, group = blocks(system)
         rows = system.dim
@@ -324,6 +324,10 @@ class HBVMProgram(Compiled):
         if lanes is None:
             raise InputError(f"{self.description} has no lanes for such vectors; integrate one by one.")
         return batch_along(self, lanes, Y0, par, times, check_start(t0), directions, threads)
+
+    def field_of_eight(self) -> binary.Native:
+        """Return the field on eight of the stages that lie side by side, compiled or loaded."""
+        return field_of(self.system, self._quantity, 8, self.constants.lanes)
 
     def implicit(self) -> Workspace:
         """Return memory for the implicit solver; its code is compiled, or loaded, the first time."""

@@ -38,12 +38,14 @@ from integrators.kernel.native.memory import address
 from integrators.kernel.noise import ALL_LENGTHS, Noise, field_noise
 from integrators.kernel.pace import FEWEST, Pace
 from integrators.kernel.parts.implicit import ALWAYS_IMPLICIT, AUTO, FOR_VECTORS, NOT_WANTED
+from integrators.kernel.parts.team import BLOCK
 from integrators.kernel.plan import Plan
 from integrators.kernel.step.rule import STAGNATION
 from integrators.kernel.tables import Constants
 from integrators.kernel.tangent.frames import Frames
 from integrators.kernel.tangent.group import Directions
 from integrators.kernel.tangent.vectors import Vectors
+from integrators.kernel.threads import Threads
 from integrators.protocol import (
     SAMPLINGS,
     Array,
@@ -85,6 +87,7 @@ class Program(Protocol):
     solver: Solver
     second: bool
     varying: bool
+    field: binary.Native
     compile_seconds: float
 
     @property
@@ -102,6 +105,7 @@ class Program(Protocol):
     def renew(self, own: Context, partial: Context, par: Array) -> None: ...
     def scaled(self, h: float) -> dict[str, Array]: ...
     def implicit(self) -> Workspace: ...
+    def field_of_eight(self) -> binary.Native: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,6 +157,7 @@ class HBVMStepper(ABC):
     variations: Array | None = None
     """Tangent vectors at the last samples, shape (m, dim, n); see `follow`."""
     _vectors: Vectors | None = None
+    _threads: Threads | None = None
     _recorded = False  # whether steps are recorded for an adjoint
     stop: threading.Event | None = None  # set by another thread: come back, what is made is not wanted
 
@@ -176,6 +181,25 @@ class HBVMStepper(ABC):
         self.search = KernelSearch(sought, (self._context, self._partial), end)
         self._pace = Pace(CHUNK_WITH_EVENTS, self._dim)
         self._pace.steps = FEWEST
+
+    def share(self, threads: int) -> None:
+        """Share the work of the steps among threads; see `integrators.protocol.SharedSteps`."""
+        program, started, rows = self._program, binary.clock(), self._context.rows
+        system, few = program.system, rows <= BLOCK
+        if program.kept:
+            reason = "steps of a line integral are not shared"
+        elif program.field.calls_back:
+            reason = f"the right-hand side of {system.name} is Python's, which one thread runs at a time"
+        elif few and system.traced:
+            reason = f"steps of {system.name} are shared from {BLOCK + 1} rows on, and it has {rows}"
+        elif few and program.constants.k <= 8:
+            reason = f"eight stages of {system.name} are evaluated in one thread"
+        else:
+            contexts = self._context, self._partial
+            self._threads = Threads(threads, contexts, program.field_of_eight())
+            program.compile_seconds += binary.clock() - started
+            return
+        raise InputError(f"threads={threads} saves no time: {reason}; leave it out.")
 
     def follow(self, state: ArrayLike, parameters: ArrayLike) -> None:
         """Let tangent vectors follow the trajectory from here on; see `integrators.protocol.Variations`."""
@@ -558,7 +582,7 @@ class HBVMStepper(ABC):
     def _enter(self, call: Callable[[], int]) -> int:
         """Return how the kernel came back."""
         try:
-            return call()
+            return self._threads.during(call) if self._threads else call()
         except UserError as raised:
             self.error = raised.error
             return NOT_FINITE

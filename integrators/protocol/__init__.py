@@ -49,7 +49,8 @@ by `offers`; without it the method still integrates. The conformance kit checks 
 15. `Batches`: ``batch`` of a program integrates many initial conditions faster than one after another, for
     `integrate_many`. `PreparedBatches`: ``prepare_batch`` does everything except the integration, which the
     benchmark can then time separately. `Threads`: with ``threaded`` it takes ``threads=``. `PieceSize`:
-    ``piece`` is the recommended number of trajectories of the first call.
+    ``piece`` is the recommended number of trajectories of the first call. `SharedSteps`: ``share`` of a
+    stepper lets several threads share each step.
 16. `Variations`: ``follow`` of a stepper propagates tangent vectors; ``variations`` are the vectors at the
     samples of the last ``advance``. `BatchesAlong`: ``batch_along`` of a program integrates many initial
     conditions with tangent vectors, if it ``goes_along`` with so many.
@@ -78,6 +79,7 @@ from integrators.protocol.capabilities import (  # noqa: F401 -- some are for th
     PieceSize,
     PreparedBatches,
     Samplings,
+    SharedSteps,
     Threads,
     Variations,
     members,
@@ -123,6 +125,7 @@ __all__ = [
     "Program",
     "Samples",
     "Samplings",
+    "SharedSteps",
     "Stats",
     "Status",
     "Stepper",

@@ -298,6 +298,20 @@ class Threads(Protocol):
     threaded: bool
 
 
+class SharedSteps(Protocol):
+    """A stepper whose steps several threads can share."""
+
+    def share(self, threads: int) -> None:
+        """Share the work of each step among so many threads; the samples are bitwise the same.
+
+        Raises
+        ------
+        problems.errors.InputError
+            Where that would save no time, with the reason.
+        """
+        ...
+
+
 class PieceSize(Protocol):
     """A program whose ``batch`` has a recommended number of trajectories for its first call.
 
@@ -345,7 +359,7 @@ class AsHBVM(Protocol):
 
 CAPABILITIES: tuple[type, ...] = (
     Samplings, Destination, KeptError, Checkpoints, Interruptible,
-    Events, Actions, Batches, BatchesAlong, BatchesEvents, PreparedBatches, Threads, PieceSize,
+    Events, Actions, Batches, BatchesAlong, BatchesEvents, PreparedBatches, Threads, SharedSteps, PieceSize,
     Variations, Gradients, DoubleDouble, AsHBVM,
 )  # fmt: skip
 """All of them."""

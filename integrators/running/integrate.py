@@ -1,5 +1,6 @@
 """Integrate a problem with a method: the one function most users need."""
 
+import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import lru_cache
@@ -15,6 +16,7 @@ from integrators import registry
 from integrators.caveats import Losses, lost_invariants
 from integrators.events.event import Event, named
 from integrators.events.finder import Ending, Finder, started_with_events
+from integrators.options import Count
 from integrators.protocol import (
     SAMPLINGS,
     Array,
@@ -28,6 +30,7 @@ from integrators.protocol import (
     Samples,
     SamplingName,
     Samplings,
+    SharedSteps,
     Status,
     UserError,
     check_problem,
@@ -68,6 +71,7 @@ def integrate(
     *,
     variations: Any = None,
     start: Any = None,
+    threads: Count = 1,
     progress: bool | Report = False,
     checkpoint: File | None = None,
     every_seconds: NotNegative = SECONDS,
@@ -104,6 +108,11 @@ def integrate(
     start : array_like, shape (dim,) or (dim, 2), optional
         The initial state with more digits than doubles have, for ``Gauss(..., precision="double-double")``:
         numbers of mpmath, or pairs of doubles. Rounded to doubles it must be that of the problem.
+    threads : int
+        Number of threads that share each step of HBVM and Gauss, for large systems: the vector field is
+        evaluated at eight stages by each (with sixteen stages, by two threads), and the other operations are
+        shared by components. The solution is bitwise the same with any number. Other methods, small systems
+        and right-hand sides in Python take one thread. For many trajectories use `integrate_many`.
     progress : bool or callable, optional
         True: show a progress bar on a terminal. A function: it is called about ten times a second with an
         `integrators.Progress`.
@@ -150,7 +159,7 @@ def integrate(
     if progress is True:
         with Bar() as bar:
             return integrate(
-                problem, method, times, sample, events, variations=variations, start=start,
+                problem, method, times, sample, events, variations=variations, start=start, threads=threads,
                 progress=bar, checkpoint=checkpoint, every_seconds=every_seconds, resume=resume,
             )  # fmt: skip
 
@@ -181,6 +190,8 @@ def integrate(
         stepper = started(program, method, problem, wanted, problem.y0, problem.par, problem.t0, end)
     else:
         stepper = cast("DoubleDouble", program).start_pairs(begin, problem.par, problem.t0)
+    if threads > 1:
+        _share(stepper, method, threads)
     if (checkpoint is not None or resume is not None) and not offers(stepper, Checkpoints):
         raise InputError(f"{method!r} has no checkpoints; leave out checkpoint= and resume=.")
     if grid.size and offers(stepper, Destination):
@@ -247,6 +258,18 @@ def integrate(
         error=error,
     )
     return _with_events(solution, stepper.search, keeps=grid.size > 0) if wanted else solution
+
+
+def _share(stepper: Any, method: MethodBase, threads: int) -> None:
+    """Let threads share the steps of a stepper."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    if threads > cores:
+        raise InputError(
+            f"threads={threads} is more than the {cores} cores that this process may use; give fewer."
+        )
+    if not offers(stepper, SharedSteps):
+        raise InputError(f"{method!r} integrates one trajectory in one thread; leave out threads=.")
+    stepper.share(threads)
 
 
 def _pieces(

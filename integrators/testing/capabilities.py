@@ -27,6 +27,7 @@ from integrators.protocol import (
     PieceSize,
     PreparedBatches,
     Samplings,
+    SharedSteps,
     Status,
     Threads,
     Variations,
@@ -345,6 +346,20 @@ def threads_change_no_bits(method: MethodBase, problem: Problem) -> str | None:
     return None
 
 
+def shared_steps_are_the_same(method: MethodBase, problem: Problem) -> str | None:
+    """Check that steps that two threads share are bitwise those of one."""
+    alone, shared = start(method, problem), start(method, problem)
+    if not offers(shared, SharedSteps):
+        return "no threads share its steps"
+    try:
+        shared.share(2)
+    except InputError as refusal:
+        return str(refusal)
+    ours, theirs = (stepper.advance(regular(problem, 5)).y for stepper in (alone, shared))
+    require(np.array_equal(ours, theirs), "threads change no bits")
+    return None
+
+
 def the_size_of_a_piece_is_a_count(method: MethodBase, problem: Problem) -> str | None:
     """Check that the size of a first piece is a whole number above 0."""
     program: Any = method.compile(problem.system)
@@ -405,6 +420,7 @@ CHECK_OF: dict[type, Callable[[MethodBase, Problem], str | None]] = {
     BatchesEvents: batches_find_the_events_of_single_trajectories,
     PreparedBatches: prepared_batches_are_batches,
     Threads: threads_change_no_bits,
+    SharedSteps: shared_steps_are_the_same,
     PieceSize: the_size_of_a_piece_is_a_count,
     Variations: tangents_follow_and_change_nothing,
     Gradients: adjoints_are_what_tangents_say,

@@ -85,6 +85,12 @@ def load_anew(typing, memory, name):
     return _kind(slot)(memory, name), generate
 
 
+@intrinsic
+def address_of(typing, memory):
+    """Return the address of a memory."""
+    return types.int64(memory), lambda context, builder, sig, args: builder.ptrtoint(args[0], INTEGER)
+
+
 def _names(declared: type[Memory | Part]) -> set[str]:
     """Return the names of all that a memory holds, and its parts."""
     parts = declared.part_of

@@ -13,7 +13,9 @@ from problems.systems.base import System
 BUILT_BY = stages.__name__
 
 
-def compile_field(system: System, quantity: targets.Quantity, lanes: int) -> binary.Native:
+def compile_field(
+    system: System, quantity: targets.Quantity, lanes: int, stride: int | None = None
+) -> binary.Native:
     """Compile one of a system's functions for stage memory, or load it.
 
     Parameters
@@ -24,6 +26,8 @@ def compile_field(system: System, quantity: targets.Quantity, lanes: int) -> bin
         ``"field"``, or ``"force"`` for the second-order form, or another function of the system.
     lanes : int
         Stages per call.
+    stride : int, optional
+        Stages that lie side by side; by default no others.
 
     Returns
     -------
@@ -31,5 +35,5 @@ def compile_field(system: System, quantity: targets.Quantity, lanes: int) -> bin
         Its note is `ON_LANES` or `ONE_BY_ONE`.
     """
     source = targets.source(system, quantity, "numba")
-    name = store.key("field", source.text, str(lanes), binary.sources(BUILT_BY))
-    return binary.obtain(name, lambda: stages.build(targets.numba(system, quantity).py_func, lanes))
+    name = store.key("field", source.text, f"{lanes} {stride or lanes}", binary.sources(BUILT_BY))
+    return binary.obtain(name, lambda: stages.build(targets.numba(system, quantity).py_func, lanes, stride))

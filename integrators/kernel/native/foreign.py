@@ -19,11 +19,13 @@ from problems import targets
 from problems.systems.base import System
 from problems.systems.opaque import Opaque
 
-_functions: WeakKeyDictionary[Opaque, dict[int, tuple[int, Any]]] = WeakKeyDictionary()
+_functions: WeakKeyDictionary[Opaque, dict[tuple[int, int], tuple[int, Any]]] = WeakKeyDictionary()
 """The address of each field by lanes, and the function that it is of: as long as its system is there."""
 
 
-def field_of(system: System, quantity: targets.Quantity, lanes: int) -> binary.Native:
+def field_of(
+    system: System, quantity: targets.Quantity, lanes: int, stride: int | None = None
+) -> binary.Native:
     """Return one of a system's functions for stage memory; see `field.compile_field`.
 
     Raises
@@ -33,19 +35,20 @@ def field_of(system: System, quantity: targets.Quantity, lanes: int) -> binary.N
         cannot be compiled for arrays of numbers.
     """
     if not isinstance(system, Opaque) or quantity != "field":
-        return compile_field(system, quantity, lanes)
+        return compile_field(system, quantity, lanes, stride)
     started = perf_counter()
     with binary.lock:  # two of them would leave one thread with the address of what the other throws away
         compiled = _functions.setdefault(system, {})
-        known = lanes in compiled
+        apart = stride or lanes
+        known = (lanes, apart) in compiled
         if not known:
-            compiled[lanes] = (_compiled if system.numba else _called)(system, lanes)
-        address, function = compiled[lanes]
+            compiled[lanes, apart] = (_compiled if system.numba else _called)(system, lanes, apart)
+        address, function = compiled[lanes, apart]
     seconds = perf_counter() - started
     return binary.Native(address, ONE_BY_ONE, known, seconds, not system.numba, (system, function))
 
 
-def _compiled(system: Opaque, lanes: int) -> tuple[int, Any]:
+def _compiled(system: Opaque, lanes: int, stride: int) -> tuple[int, Any]:
     """Return the address of a numba field on stage memory, and the function."""
     import numba
     from numba import types
@@ -82,8 +85,8 @@ def _compiled(system: Opaque, lanes: int) -> tuple[int, Any]:
     # Loops, not array expressions: those take seconds to compile.
     def field(t, stages, par, values):
         times = carray(t, (lanes,))
-        rows = carray(stages, (dim, lanes))
-        out = carray(values, (dim, lanes))
+        rows = carray(stages, (dim, stride))
+        out = carray(values, (dim, stride))
         numbers = np.empty(size)
         given = carray(par, (size,))
         for i in range(size):
@@ -114,23 +117,23 @@ def _compiled(system: Opaque, lanes: int) -> tuple[int, Any]:
     return address, function
 
 
-def _called(system: Opaque, lanes: int) -> tuple[int, Any]:
+def _called(system: Opaque, lanes: int, stride: int) -> tuple[int, Any]:
     """Return the address of a callback to a Python field, and the callback."""
     dim, size = system.dim, system.n_par
     owner = ref(system)  # which holds this callback, not the other way round
-    line, block, numbers = (ctypes.c_double * n for n in (lanes, dim * lanes, size))
+    line, block, numbers = (ctypes.c_double * n for n in (lanes, dim * stride, size))
 
     def view(kind: Any, address: int) -> Any:
         return np.frombuffer(kind.from_address(address))
 
     def field(t: int, stages: int, par: int, values: int) -> None:
         try:
-            out = view(block, values).reshape(dim, lanes)
+            out = view(block, values).reshape(dim, stride)[:, :lanes]
             out[:] = np.nan
             if raised.kept() is not None:
                 return
             times = view(line, t).tolist()
-            states = view(block, stages).reshape(dim, lanes).T.copy()
+            states = view(block, stages).reshape(dim, stride)[:, :lanes].T.copy()
             given = view(numbers, par).copy() if size else np.empty(0)
             derivatives = np.empty((lanes, dim))
             previous: tuple[Any, ...] = ()

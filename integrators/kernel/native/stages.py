@@ -8,8 +8,10 @@ ON_LANES, ONE_BY_ONE = "L", "S"
 Arguments = list[tuple[Any, str]]
 
 
-def build(function: Any, lanes: int) -> tuple[str, bytes]:
+def build(function: Any, lanes: int, stride: int | None = None) -> tuple[str, bytes]:
     """Compile ``function(t, y, par, out)`` on lanes if that is possible, else stage by stage.
+
+    Rows are ``stride`` numbers apart, by default as many as there are lanes.
 
     Raises
     ------
@@ -19,22 +21,24 @@ def build(function: Any, lanes: int) -> tuple[str, bytes]:
     from numba import NumbaError
 
     try:
-        return ON_LANES, build_on_lanes(function, lanes)
+        return ON_LANES, build_on_lanes(function, lanes, stride)
     except NumbaError:
-        return ONE_BY_ONE, build_one_by_one(function, lanes)
+        return ONE_BY_ONE, build_one_by_one(function, lanes, stride)
 
 
-def build_on_lanes(function: Any, lanes: int) -> bytes:
+def build_on_lanes(function: Any, lanes: int, stride: int | None = None) -> bytes:
     """Compile ``function(t, y, par, out)`` with t and y[i] as lanes."""
-    return binary.build(*on_lanes(function, lanes))
+    return binary.build(*on_lanes(function, lanes, stride))
 
 
-def build_one_by_one(function: Any, lanes: int) -> bytes:
+def build_one_by_one(function: Any, lanes: int, stride: int | None = None) -> bytes:
     """Compile a loop over stages that calls ``function`` with scalars."""
-    return binary.build(*_one_by_one(function, lanes))
+    return binary.build(*_one_by_one(function, lanes, stride))
 
 
-def on_lanes(function: Any, lanes: int, *, par: bool = False) -> tuple[Any, Arguments]:
+def on_lanes(
+    function: Any, lanes: int, stride: int | None = None, *, par: bool = False
+) -> tuple[Any, Arguments]:
     """Return ``function(t, y, par, out)`` for numba, and its arguments on lanes for `binary.build`.
 
     Parameters are the same in all lanes, or with ``par`` rows like the stages.
@@ -44,24 +48,27 @@ def on_lanes(function: Any, lanes: int, *, par: bool = False) -> tuple[Any, Argu
     from integrators.kernel.simd.lanes import Lanes
     from integrators.kernel.simd.views import DOUBLES, Rows
 
-    stages = Rows(lanes)
+    stages = Rows(lanes, stride)
     arguments = [(Lanes(lanes), f"<{lanes} x double>"), (stages, "ptr"), (stages if par else DOUBLES, "ptr")]
     return compiled(function), [*arguments, (stages, "ptr")]
 
 
-def _one_by_one(function: Any, lanes: int) -> tuple[Any, Arguments]:
+def _one_by_one(function: Any, lanes: int, stride: int | None = None) -> tuple[Any, Arguments]:
     from numba import types
 
     from integrators.kernel.native.jit import compiled
     from integrators.kernel.simd.views import strided
 
-    scalar = compiled(function)
+    scalar, apart = compiled(function), stride or lanes
 
     def loop(t, stages, par, values):
         for stage in range(lanes):
             time = strided(t, 1)[stage]
             scalar(
-                time, strided(stages + 8 * stage, lanes), strided(par, 1), strided(values + 8 * stage, lanes)
+                time,
+                strided(stages + 8 * stage, apart),
+                strided(par, 1),
+                strided(values + 8 * stage, apart),
             )
 
     return compiled(loop), [(types.int64, "i64")] * 4

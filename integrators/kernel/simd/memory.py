@@ -225,6 +225,9 @@ def _caller(arguments: int, returns: Any = types.void) -> Any:
         returned = builder.call(builder.inttoptr(args[0], kind.as_pointer()), args[1:])
         return context.get_dummy_value() if returns == types.void else returned
 
+    def none(typing, function):
+        return returns(types.int64), generate
+
     def two(typing, function, a, b):
         return returns(types.int64, a, b), generate
 
@@ -237,7 +240,7 @@ def _caller(arguments: int, returns: Any = types.void) -> Any:
     def eleven(typing, function, a, b, c, d, e, f, g, h, i, j, k):
         return returns(types.int64, a, b, c, d, e, f, g, h, i, j, k), generate
 
-    return intrinsic({2: two, 3: three, 4: four, 11: eleven}[arguments])
+    return intrinsic({0: none, 2: two, 3: three, 4: four, 11: eleven}[arguments])
 
 
 call_field = _caller(4)
@@ -246,6 +249,10 @@ call_iterations = _caller(3)
 """``call_iterations(fused, ctx, count, after)``: see `integrators.kernel.step.fused`."""
 call_solver = _caller(3, types.int64)
 """``call_solver(solver, ctx, memory, started)``: the implicit solver."""
+call_nothing = _caller(0)
+"""``call_nothing(function)``: a function without arguments."""
+call_work = _caller(2, types.int64)
+"""``call_work(work, team, helper)``: see `integrators.kernel.step.work`."""
 call_line = _caller(2, types.int64)
 """``call_line(line, what, ctx)``: a line integral, see `integrators.kernel.context.Context.line`."""
 call_look = _caller(2, types.int64)

@@ -28,11 +28,11 @@ from problems.targets.called import release, room
 
 
 class Rows(types.Type):
-    """Memory of K doubles per row: ``rows[i]`` is a `Lanes(K)`."""
+    """Memory of K doubles per row, a row every ``stride`` of them: ``rows[i]`` is a `Lanes(K)`."""
 
-    def __init__(self, count: int):
-        self.count = count
-        super().__init__(name=f"Rows({count})")
+    def __init__(self, count: int, stride: int | None = None):
+        self.count, self.stride = count, stride or count
+        super().__init__(name=f"Rows({count}, {self.stride})")
 
 
 class Numbers(types.Type):
@@ -116,16 +116,18 @@ def _type_shifted(context):
 
 @lower_builtin(operator.getitem, Rows, types.Integer)
 def _get_row(context, builder, sig, args):
-    count = sig.args[0].count
-    return builder.load(element(builder, args[0], args[1], count, vector(count)), align=_aligned(count))
+    rows = sig.args[0]
+    place = element(builder, args[0], args[1], rows.stride, vector(rows.count))
+    return builder.load(place, align=_aligned(rows.count))
 
 
 @lower_builtin(operator.setitem, Rows, types.Integer, Lanes)
 @lower_builtin(operator.setitem, Rows, types.Integer, types.Float)
 def _set_row(context, builder, sig, args):
-    count = sig.args[0].count
-    (value,) = spread_to(builder, sig.args[2:], args[2:], count)
-    builder.store(value, element(builder, args[0], args[1], count, vector(count)), align=_aligned(count))
+    rows = sig.args[0]
+    (value,) = spread_to(builder, sig.args[2:], args[2:], rows.count)
+    place = element(builder, args[0], args[1], rows.stride, vector(rows.count))
+    builder.store(value, place, align=_aligned(rows.count))
 
 
 @lower_builtin(operator.getitem, Numbers, types.Integer)
@@ -152,7 +154,7 @@ def _type_room(context):
         if not isinstance(n, types.IntegerLiteral):
             return None
         if isinstance(like, Rows):
-            return like(like, n)
+            return Rows(like.count)(like, n)
         return DOUBLES(like, n) if isinstance(like, Numbers) else None
 
     return typed

@@ -7,6 +7,7 @@ formed; the state is a compensated pair whose error enters the stages.
 
 from integrators.kernel.context import RUNNING
 from integrators.kernel.native.jit import compiled
+from integrators.kernel.parts.team import PREPARE
 from integrators.kernel.routes import PER_OCTAVE, THROUGH
 from integrators.kernel.simd.lanes import fma
 from integrators.kernel.simd.memory import get, put, put_lower, put_upper, splat8, spread
@@ -20,6 +21,7 @@ from integrators.kernel.step.fixed_point import (
     through,
 )
 from integrators.kernel.step.rule import FARTHEST
+from integrators.kernel.step.share import share
 from integrators.kernel.step.size import take_sizes
 from integrators.kernel.step.stages import offset
 from integrators.kernel.step.sums import multiplied, part_of_drift, time_of_step
@@ -68,21 +70,30 @@ def set_times(ctx):
 @compiled
 def prepare(ctx):
     """Set the stages' times, and what they have without the field's values, from the state."""
+    set_times(ctx)
+    if ctx.team:
+        share(ctx, PREPARE, ctx.tables.matrix)
+    else:
+        prepare_rows(ctx, 0, ctx.rows)
+
+
+@compiled
+def prepare_rows(ctx, first, last):
+    """Set what the stages have without the field's values, from row first, a multiple of 8, to last."""
     scratch = ctx.scratch
     state, error, row_state, row_error = ctx.state, ctx.error, scratch.row_state, scratch.row_error
-    rows, lanes = ctx.rows, ctx.lanes
-    set_times(ctx)
+    lanes = ctx.lanes
     if ctx.second == 0:
-        for i in range((rows + 7) // 8):
+        for i in range(first // 8, (last + 7) // 8):
             put(row_state, 8 * i, get(state, 8 * i))
             put(row_error, 8 * i, get(error, 8 * i))
         for chunk in range(ctx.chunks):
             base = scratch.base + offset(ctx, chunk)
-            for d in range(rows):
+            for d in range(first, last):
                 put(base, lanes * d, spread(row_error, d))
         return
     row_drift, row_drift_low, factor = scratch.row_drift, scratch.row_drift_low, ctx.factors.drift
-    for i in range((rows + 3) // 4):
+    for i in range(first // 4, (last + 3) // 4):
         z, z_low, kh = get(state, 8 * i), get(error, 8 * i), get(factor, 8 * i)
         moved, moved_low = multiplied(kh, z, z_low)
         put_upper(row_state, 4 * i, z)
@@ -93,7 +104,7 @@ def prepare(ctx):
     for chunk in range(ctx.chunks):
         c, c_low = get(nodes, 8 * chunk), get(nodes_low, 8 * chunk)
         base = scratch.base + offset(ctx, chunk)
-        for d in range(rows):
+        for d in range(first, last):
             moved, moved_low = spread(row_drift, d), spread(row_drift_low, d)
             put(base, lanes * d, part_of_drift(c, c_low, moved, moved_low, spread(row_error, d)))
 
@@ -118,9 +129,9 @@ def start_extrapolated(ctx):
     """First stages from the values of the previous step, or of two, of the same length."""
     tables = ctx.tables
     if tables.two_steps != 0 and ctx.older_length == ctx.h:
-        product_of_two(ctx, tables.extrapolation_two, ctx.older_values)
+        product_of_two(ctx, tables.extrapolation_two)
     elif ctx.route == THROUGH:
-        through(ctx, tables.mode_projection, tables.mode_groups, tables.extrapolation)
+        through(ctx, tables.mode_projection, tables.mode_groups, tables.extrapolation, 0, ctx.rows)
     else:
         product(ctx, tables.extrapolation)
     ctx.solver.predicted = 1

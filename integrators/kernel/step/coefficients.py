@@ -11,8 +11,10 @@ from integrators.kernel.parts.estimate import (
     GAMMA_3,
     LAST,
 )
+from integrators.kernel.parts.team import COEFFICIENTS
 from integrators.kernel.simd.lanes import fma
 from integrators.kernel.simd.memory import get, put, splat8, sums
+from integrators.kernel.step.share import share
 from integrators.kernel.step.stages import offset
 
 
@@ -38,10 +40,10 @@ def coefficient_of_two(table, which, low, high):
 
 
 @compiled
-def take_coefficients_of_two(ctx):
-    """As `take_coefficients`, for two times eight stages: the same sums, with each value loaded once."""
+def take_coefficients_of_two(ctx, first, last):
+    """As `take_coefficients_of_rows`, for two times eight stages: the same sums, each value loaded once."""
     gammas, table, values = ctx.estimate.coefficients, ctx.estimate.estimators, ctx.values
-    for d in range(ctx.rows):
+    for d in range(first, last):
         x, y = get(values, 16 * d), get(values, 16 * d + 8)
         low = (
             coefficient_of_two(table, GAMMA_0, x, y),
@@ -61,10 +63,19 @@ def take_coefficients_of_two(ctx):
 @compiled
 def take_coefficients(ctx):
     """Set what is known of the field from its values in the solved step, row by row."""
+    if ctx.team:
+        share(ctx, COEFFICIENTS, ctx.tables.matrix)
+    else:
+        take_coefficients_of_rows(ctx, 0, ctx.rows)
+
+
+@compiled
+def take_coefficients_of_rows(ctx, first, last):
+    """As `take_coefficients`, of the rows from first to last."""
     if ctx.route == 16:
-        take_coefficients_of_two(ctx)
+        take_coefficients_of_two(ctx, first, last)
         return
-    for d in range(ctx.rows):
+    for d in range(first, last):
         low = (
             coefficient(ctx, d, GAMMA_0),
             coefficient(ctx, d, GAMMA_1),

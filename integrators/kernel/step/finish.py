@@ -8,9 +8,11 @@ keep the errors of all sums and products makes it a fifth smaller, and steps of 
 
 from integrators.kernel.context import ARRIVE, BY_INCREMENT, DONE, END, NOT_FINITE, UNSOLVED
 from integrators.kernel.native.jit import compiled
-from integrators.kernel.simd.memory import call_line, get, put, splat8, sums_and_errors, swap, total
+from integrators.kernel.parts.team import FINISH
+from integrators.kernel.simd.memory import call_line, get, largest, put, splat8, sums_and_errors, swap
 from integrators.kernel.simd.operations import fma, two_sum
 from integrators.kernel.step.projection import project_onto_energy
+from integrators.kernel.step.share import largest_result, share
 from integrators.kernel.step.stages import offset
 from integrators.kernel.step.sums import multiplied
 
@@ -121,12 +123,23 @@ def finish_unprojected(ctx):
         return call_line(ctx.line, END, ctx)
     if ctx.solved == BY_INCREMENT:
         return finish_by_increment(ctx)
-    rows, h = ctx.rows, ctx.h
+    if ctx.team:
+        share(ctx, FINISH, ctx.tables.matrix)
+        damage = largest_result(ctx)
+    else:
+        damage = largest(finish_rows(ctx, 0, ctx.rows))
+    return DONE if damage == 0.0 else NOT_FINITE
+
+
+@compiled
+def finish_rows(ctx, first, last):
+    """Set the next state of the rows from first, a multiple of 8, to last; return eight zeros, or a NaN."""
+    h = ctx.h
     state, error, next_state, next_error = ctx.state, ctx.error, ctx.next_state, ctx.next_error
     damage = splat8(0.0)
     if ctx.second:
         factor, kick = ctx.factors.drift, ctx.factors.kick
-        for i in range((rows + 3) // 4):
+        for i in range(first // 4, (last + 3) // 4):
             z, z_low, kh = get(state, 8 * i), get(error, 8 * i), get(factor, 8 * i)
             moved, moved_low = multiplied(kh, z, z_low)
             force, low = impulses(ctx, 4 * i)
@@ -137,13 +150,13 @@ def finish_unprojected(ctx):
             put(next_error, 8 * i, rounding)
             damage += new * 0.0
     else:
-        for i in range((rows + 7) // 8):
+        for i in range(first // 8, (last + 7) // 8):
             mean, low = means(ctx, 8 * i)
             new, rounding = added(get(state, 8 * i), get(error, 8 * i), splat8(h), mean, low)
             put(next_state, 8 * i, new)
             put(next_error, 8 * i, rounding)
             damage += new * 0.0
-    return DONE if total(damage) == 0.0 else NOT_FINITE
+    return abs(damage)
 
 
 @compiled

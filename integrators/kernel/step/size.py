@@ -17,15 +17,20 @@ SIZES_LAST = 8  # steps for which the sizes of the blocks are good
 @compiled
 def change(ctx, scale):
     """Return the largest of the stages' change in size, each row times its scale; NaN if any is."""
-    new, old = ctx.stages, ctx.scratch.old_stages
-    rows, lanes = ctx.rows, ctx.lanes
+    return largest(change_of_rows(ctx, scale, 0, ctx.rows))
+
+
+@compiled
+def change_of_rows(ctx, scale, first, last):
+    """Return eight numbers of which the largest is that of `change`, of the rows from first to last."""
+    new, old, lanes = ctx.stages, ctx.scratch.old_stages, ctx.lanes
     top = splat8(0.0)
     for chunk in range(ctx.chunks):
         start = offset(ctx, chunk)
-        for d in range(rows):
+        for d in range(first, last):
             moved = abs(get(new + start, lanes * d) - get(old + start, lanes * d))
             top = larger(top, moved * spread(scale, d))
-    return largest(top)
+    return top
 
 
 @compiled

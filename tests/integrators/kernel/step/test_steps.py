@@ -212,7 +212,7 @@ def test_a_field_that_cannot_run_on_lanes_runs_stage_by_stage(chain, driven, mon
     problems = (chain, driven)
     expected = [steps_of(problem, 6, 3, 0.2, 5) for problem in problems]
 
-    def refuse(function, lanes):
+    def refuse(function, lanes, stride):
         raise TypingError("not on lanes")
 
     kernel = {name: code for name, code in binary._loaded.items() if code.note == " "}
