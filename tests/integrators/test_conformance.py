@@ -22,6 +22,7 @@ METHODS = [
 NEED_NOT_APPLY = (
     testing.failure_is_a_status,
     testing.the_size_of_a_piece_is_a_count,
+    testing.shared_steps_are_the_same,
     testing.events_may_change_the_state,
     testing.pairs_hold_twice_the_digits,
     testing.batches_along_are_single_trajectories,  # of more than 16 stages

@@ -239,6 +239,7 @@ def test_conforms(check):
         testing.prepared_batches_are_batches,
         testing.threads_change_no_bits,
         testing.the_size_of_a_piece_is_a_count,
+        testing.shared_steps_are_the_same,
         testing.tangents_follow_and_change_nothing,
         testing.batches_along_are_single_trajectories,
         testing.adjoints_are_what_tangents_say,

@@ -19,6 +19,7 @@ NEED_NOT_APPLY = (
     testing.keeps_the_error_of_a_user_s_function,
     testing.failure_is_a_status,
     testing.the_size_of_a_piece_is_a_count,
+    testing.shared_steps_are_the_same,
     testing.is_the_hbvm_that_it_names,
     testing.tangents_follow_and_change_nothing,
     testing.batches_along_are_single_trajectories,

@@ -23,6 +23,7 @@ def test_conforms(check, method):
     reason = check(method, testing.two_bodies())
     rare = (
         testing.the_size_of_a_piece_is_a_count,
+        testing.shared_steps_are_the_same,
         testing.pairs_hold_twice_the_digits,
         testing.batches_along_are_single_trajectories,
     )
