@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from integrators.options import NotNegative, Share
-from integrators.peers import load
+from integrators.peers import cvode, load
 from integrators.protocol import Array, MethodBase, Status, UserError
 from integrators.running.watchdog import StallDetector, stall_detector
 from integrators.stepping import ProgramBase, StepperBase
@@ -90,6 +90,13 @@ class CVODEProgram(ProgramBase):
         if self.jacobian is not None:
             self.entries = targets.numba(system, self.jacobian)
             self.entries(0.0, np.ones(system.dim), system.pack({}), np.empty(self.jacobian.rows.size))
+        self.compiled: cvode.CompiledCVODE | None = None
+        if system.traced and (loaded := cvode.library()) is not None:
+            entries = None if self.jacobian is None else self.entries
+            sparse = self.jacobian is not None and is_sparse(self.jacobian)
+            self.compiled = cvode.CompiledCVODE(
+                loaded, method, system.dim, self.field, self.jacobian, entries, sparse
+            )
         self.from_cache = None
         self.compile_seconds = perf_counter() - started
 
@@ -117,7 +124,7 @@ class CVODEProgram(ProgramBase):
         if jacobian is None:
             return {}
         entries = self.entries
-        if jacobian.shape[0] > DENSE and jacobian.density < SPARSE:
+        if is_sparse(jacobian):
             from scipy.sparse import csc_matrix
 
             numbers = csc_matrix(
@@ -147,6 +154,11 @@ class CVODEProgram(ProgramBase):
         return CVODEStepper(self, y, par, t)
 
 
+def is_sparse(jacobian: Any) -> bool:
+    """Whether a Jacobian is worth a sparse matrix."""
+    return jacobian.shape[0] > DENSE and jacobian.density < SPARSE
+
+
 class CVODEStepper(StepperBase):
     """A trajectory of CVODE.
 
@@ -155,8 +167,8 @@ class CVODEStepper(StepperBase):
     ``"steps"``
         Its steps, up to the last time.
     ``"stop"``
-        The last step before each time is shortened onto it. From the start to one time it is one call of
-        scikit-sundae's ``solve``.
+        The last step before each time is shortened onto it. From the start to one time CVODE's C functions go
+        without Python, see `integrators.peers.cvode`.
     """
 
     samplings = ("partial", "steps", "stop")
@@ -164,21 +176,21 @@ class CVODEStepper(StepperBase):
     def __init__(self, program: CVODEProgram, y: Array, par: Array, t: float):
         super().__init__(y, t)
         self._program, self._par = program, par
-        self._solver = program.solver(par)
         self._sign = self._evaluated = 0
-        self._begun = False  # to step, as is not done by `_whole`
+        self._solver: Any = None  # scikit-sundae's, where single steps are taken
         self._tn, self._yn = t, y  # the last of its steps, which may be ahead of the present
+        self._compiled = program.compiled and program.compiled.start(t, y, par)
 
     def _towards(self, end: float) -> float:
         """Return the sign of the direction to ``end``, with a solver that goes that way."""
         sign = 1 if end > self._t else -1
-        if self._sign != sign or not self._begun:
+        if self._sign != sign or self._solver is None:
             self._begin()
             self._sign = sign
         return float(sign)
 
     def _begin(self) -> None:
-        self._begun = True
+        self._solver = self._solver or self._program.solver(self._par)
         self._tn, self._yn = self._t, self._y
         self._evaluated = self._stats.evaluations or 0
         self._solver.init_step(self._t, self._y)
@@ -186,8 +198,9 @@ class CVODEStepper(StepperBase):
     def _serve(self, grid: Array, how: str) -> tuple[Array, Array]:
         end = float(grid[-1])
         alone = grid.size == 1 and self.destination in (None, end)
-        if how == "stop" and alone and not self._begun:
-            return self._whole(end)
+        run, self._compiled = self._compiled, None
+        if how == "stop" and alone and run is not None:
+            return self._whole(run, end)
         sign, watch = self._towards(end), stall_detector(self, self._tn, end)
         states = np.empty((grid.size, self._y.size))
         for i, t in enumerate(grid.tolist()):
@@ -197,21 +210,18 @@ class CVODEStepper(StepperBase):
             states[i] = self._yn if self._tn == t else self._solver.step(t, "normal").y
         return grid, states
 
-    def _whole(self, end: float) -> tuple[Array, Array]:
-        """Go from the start to one time, by the library's own loop."""
-        start = self._t
+    def _whole(self, run: cvode.Integration, end: float) -> tuple[Array, Array]:
+        """Go from the start to one time, in compiled code."""
+        start, ended = self._t, run.go(end)
+        self._stats.steps, self._stats.evaluations = ended.steps, ended.evaluations
+        self._stats.extra["jacobians"] = ended.jacobians
         self._sign = 1 if end > start else -1
-        try:
-            result = self._solver.solve(np.array([start, end]), self._y)
-        except UserError as raised:
-            self._broken(raised, start, self._y)
+        self._tn, self._yn = ended.t, ended.y
+        if ended.failed:
+            reason = f"CVODE gave up at t = {ended.t!r}: {ended.failed}"
+            self._fail(Status.STEP_UNDERFLOW, ended.t, ended.y, reason)
             return np.empty(0), np.empty((0, self._y.size))
-        self._note(result)
-        self._stats.steps += result.t.size - 1
-        self._tn, self._yn = float(result.t[-1]), result.y[-1]
-        if self._refused(result, self._tn):
-            return np.empty(0), np.empty((0, self._y.size))
-        return result.t[-1:], result.y[-1:]
+        return np.array([ended.t]), ended.y[None]
 
     def _step_states(self, end: float) -> tuple[Array, Array]:
         sign, watch = self._towards(end), stall_detector(self, self._tn, end)
