@@ -98,7 +98,8 @@ RESTRICTED = """
 from hbvm_bench.measure import machine
 import problems
 from integrators.kernel.native import binary
-from integrators.kernel.native.field import assembly
+from tests.hbvm_bench.study_folders import module
+assembly = module("costs", "budget").assembly
 print(machine.describe().get("ours_built_for"))
 print(machine.kind(machine.describe()))
 print(assembly(problems.load("pendulum").system, "field", 8).count("zmm"))
@@ -109,11 +110,16 @@ print(binary.platform())
 def test_restricted_to_avx2_our_code_has_no_wide_registers_and_another_cache_key(tmp_path):
     if machine.describe()["vector_instructions"] != "AVX-512":
         pytest.skip("a processor without AVX-512 has nothing to be restricted")
-    found = {}
+    found, root = {}, Path(__file__).parents[3]
     for name, more in {"avx2": machine.restricted_to_avx2(), "all": {}}.items():
         environment = os.environ | {"HBVM_BENCH_CACHE": str(tmp_path)} | more
         ran = subprocess.run(
-            [sys.executable, "-c", RESTRICTED], env=environment, capture_output=True, text=True, check=True
+            [sys.executable, "-c", RESTRICTED],
+            cwd=root,
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=True,
         )
         found[name] = ran.stdout.splitlines()
     built, kind, wide, *key = found["avx2"]
