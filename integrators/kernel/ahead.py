@@ -17,7 +17,6 @@ from integrators.kernel.engines import (
     solver,
     steps,
 )
-from integrators.kernel.ensemble.prepared import LANES
 from integrators.kernel.native import shipped
 from integrators.kernel.routes import FEW_ROWS
 
@@ -41,8 +40,8 @@ FORMS = [
 ]
 """Of whole iterations; see `integrators.kernel.step.fused`."""
 
-WIDTHS = [(count * LANES,) for count in (1, 2, 4)]
-"""Of trajectories side by side; see `integrators.kernel.ensemble.prepared.width_for`."""
+WIDTHS = [(8, 8), (16, 8), (32, 8), (8, 4), (16, 4)]
+"""Of trajectories side by side, and of a register; see `integrators.kernel.ensemble.prepared.width_for`."""
 
 
 def compile_ahead(processes: int = 1) -> dict[str, float | None]:

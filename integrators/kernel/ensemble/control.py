@@ -16,7 +16,7 @@ from integrators.kernel.inside.discontinuities import gap_allowed
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.lanes import everywhere
 from integrators.kernel.simd.operations import fma, greatest, opposite, size, where
-from integrators.kernel.simd.views import as_rows, rows_on_stack
+from integrators.kernel.simd.views import as_parts
 from integrators.kernel.step.control import (
     APPROACH,
     INFINITY,
@@ -45,17 +45,25 @@ from integrators.kernel.step.sums import time_after
 from integrators.kernel.trajectory.vary import LIMITED_GROWTH, MOST_GROWTH
 
 
-def ends_of_steps(lanes: int) -> Any:
-    """Return what takes the step, and aims at the next one, in the lanes where that is all."""
+def ends_of_steps(lanes: int, few: int) -> Any:
+    """Return what takes the step, and aims at the next one, in the lanes where that is all.
+
+    It looks at ``few`` of the lanes, from lane ``first`` on.
+    """
 
     @compiled
-    def speed(form, group, d, unity):
+    def part(numbers, first):
+        """Return the rows of an array as far as these lanes have them."""
+        return as_parts(numbers + first, few, lanes)
+
+    @compiled
+    def speed(form, group, first, d, unity):
         """Return the velocity by momentum of row d, as `Blocks.speed`."""
-        return speed_of(as_rows(group.velocity, lanes)[d]) if form.second else unity
+        return speed_of(part(group.velocity, first)[d]) if form.second else unity
 
     @compiled
-    def modes(form, group, values, d, parts, sums, zero):
-        """Set the Legendre coefficients of the values of row d.
+    def modes(form, group, values, d, scratch, zero):
+        """Set the Legendre coefficients of the values of row d, in the first k rows of ``scratch``.
 
         Those of even degree are the same for values at mirrored nodes, those of odd degree opposite.
         """
@@ -63,88 +71,89 @@ def ends_of_steps(lanes: int) -> Any:
         half, halves = k // 2, (k + 1) // 2
         for i in range(half):
             x, y = values[rows * i + d], values[rows * (k - 1 - i) + d]
-            parts[i], parts[k - 1 - i] = x + y, x - y
+            scratch[k + i], scratch[k + k - 1 - i] = x + y, x - y
         if k % 2 == 1:
-            parts[half] = values[rows * half + d]
+            scratch[k + half] = values[rows * half + d]
         for j in range(k):
             total = zero
             for i in range(half if j % 2 == 1 else halves):
-                total = fma(group.to_legendre[k * j + i], parts[k - 1 - i if j % 2 == 1 else i], total)
-            sums[j] = total
+                total = fma(
+                    group.to_legendre[k * j + i], scratch[k + (k - 1 - i if j % 2 == 1 else i)], total
+                )
+            scratch[j] = total
 
     @compiled
-    def keep_polynomial(form, group, d, sums, zero):
+    def keep_polynomial(form, group, first, d, scratch, zero):
         """Keep row d's polynomial for the next step's first values; return it at both ends of this one."""
         k, rows = form.k, form.rows
-        ahead, powers = as_rows(group.ahead, lanes), group.in_powers
+        ahead, powers = part(group.ahead, first), group.in_powers
         even, odd = zero, zero
         for j in range(k):
             if j % 2 == 0:
-                even = fma(sums[j], powers[k * k + j], even)
+                even = fma(scratch[j], powers[k * k + j], even)
             else:
-                odd = fma(sums[j], powers[k * k + j], odd)
+                odd = fma(scratch[j], powers[k * k + j], odd)
         for power in range(k):
             total = zero
             for j in range(power, k, 2):
-                total = fma(sums[j], powers[k * power + j], total)
+                total = fma(scratch[j], powers[k * power + j], total)
             ahead[rows * power + d] = total
         return even - odd, even + odd
 
     @compiled
-    def gap(group, d, last, start, end):
+    def gap(group, first, d, last, start, end):
         """Return how far row d's polynomials are apart where two steps meet, if farther than it may be."""
-        as_rows(group.next_ends, lanes)[d] = end
-        as_rows(group.next_last_coefficients, lanes)[d] = last
-        apart = size(start - as_rows(group.ends, lanes)[d])
-        return where(is_gap(apart, last, as_rows(group.last_coefficients, lanes)[d]), apart, 0.0)
+        part(group.next_ends, first)[d] = end
+        part(group.next_last_coefficients, first)[d] = last
+        apart = size(start - part(group.ends, first)[d])
+        return where(is_gap(apart, last, part(group.last_coefficients, first)[d]), apart, 0.0)
 
     @compiled
-    def judge(form, group, values, length, scales, slopes, gamma_errors, gamma_lasts):
+    def judge(form, group, first, values, length, scratch, scales, slopes, gamma_errors, gamma_lasts):
         """Return both errors, whether they are evident, and where blocks are certain, and visible."""
-        state, gaps = as_rows(group.state, lanes), as_rows(group.gaps, lanes)
+        state, gaps = part(group.state, first), part(group.gaps, first)
         zero, unity = everywhere(0.0, length), everywhere(1.0, length)
         error, quadrature_error, evident_error, evident_quadrature_error = zero, zero, zero, zero
         doubtful = visible = changing = zero > 0.0
         most_apart = gap_allowed(
-            group.negligible, group.outermost, length, size(as_rows(group.previous_length, lanes)[0])
+            group.negligible, group.outermost, length, size(part(group.previous_length, first)[0])
         )
         rows, count, width = form.rows, form.blocks.count, form.blocks.width
-        parts, sums = rows_on_stack(state, form.k), rows_on_stack(state, form.k)
         for g in range(form.blocks.groups):
             largest, steepest = zero, zero
             for b in range(count):
                 start = form.blocks.first + (g * count + b) * width
                 scale, slope, gamma_error, gamma_last, far = zero, zero, zero, zero, zero
                 for d in range(start, start + width):
-                    modes(form, group, values, d, parts, sums, zero)
-                    at_start, at_end = keep_polynomial(form, group, d, sums, zero)
+                    modes(form, group, values, d, scratch, zero)
+                    at_start, at_end = keep_polynomial(form, group, first, d, scratch, zero)
                     low, high, own, here, last = judged(
-                        size(sums[form.gamma_0]),
-                        size(sums[form.gamma_1]),
-                        size(sums[form.gamma_2]),
-                        size(sums[form.gamma_3]),
-                        size(sums[form.before_error]),
-                        size(sums[form.at_error]),
-                        size(sums[form.before_last]),
-                        size(sums[form.last]),
+                        size(scratch[form.gamma_0]),
+                        size(scratch[form.gamma_1]),
+                        size(scratch[form.gamma_2]),
+                        size(scratch[form.gamma_3]),
+                        size(scratch[form.before_error]),
+                        size(scratch[form.at_error]),
+                        size(scratch[form.before_last]),
+                        size(scratch[form.last]),
                         group.error_decay,
                         group.quadrature_error_decay,
                     )
                     doubtful = doubtful | is_doubtful(low, high, group.doubt)
-                    changing = changing | changes(low, high, size(sums[form.gamma_0]))
+                    changing = changing | changes(low, high, size(scratch[form.gamma_0]))
                     moved = size(state[rows + d if form.second else d])
                     scale, slope = greatest(scale, moved + length * own), greatest(slope, own)
                     gamma_error, gamma_last = greatest(gamma_error, here), greatest(gamma_last, last)
-                    far = greatest(far, gap(group, d, high, at_start, at_end))
+                    far = greatest(far, gap(group, first, d, high, at_start, at_end))
                 gaps[start], scales[start], slopes[start] = far, scale, slope
                 gamma_errors[start], gamma_lasts[start] = gamma_error, gamma_last
-                velocity = speed(form, group, start, unity)
+                velocity = speed(form, group, first, start, unity)
                 largest = greatest(scale * velocity, largest)
                 steepest = greatest(slope * velocity, steepest)
             doubtful = doubtful | (largest < SMALLEST)
             for b in range(count):
                 start = form.blocks.first + (g * count + b) * width
-                mass = unity / speed(form, group, start, unity)
+                mass = unity / speed(form, group, first, start, unity)
                 most = largest * mass
                 scale = size_in_step(scales[start], most)
                 slope = floored_slope(slopes[start], steepest * mass, group.least_slope)
@@ -171,25 +180,25 @@ def ends_of_steps(lanes: int) -> Any:
         )
 
     @compiled
-    def keep(numbers, good, new):
+    def keep(numbers, first, good, new):
         """Set a row where a step is good."""
-        row = as_rows(numbers, lanes)
+        row = part(numbers, first)
         row[0] = where(good, new, row[0])
 
     @compiled
-    def keep_rows(numbers, good, new, n):
+    def keep_rows(numbers, first, good, new, n):
         """Set n rows where a step is good."""
-        rows_, news = as_rows(numbers, lanes), as_rows(new, lanes)
+        rows_, news = part(numbers, first), part(new, first)
         for d in range(n):
             rows_[d] = where(good, news[d], rows_[d])
 
     @compiled
-    def end_step(form, group, values, h, alive, iterations, scales, slopes, gamma_errors, gamma_lasts):
+    def end_step(form, group, first, values, h, alive, scratch, scales, slopes, gamma_errors, gamma_lasts):
         length, rows = size(h), form.rows
         dim = 2 * rows if form.second else rows
-        previous_length = as_rows(group.previous_length, lanes)[0]
+        iterations, previous_length = part(group.iterations, first)[0], part(group.previous_length, first)[0]
         error, quadrature_error, error_is_evident, quadrature_error_is_evident, certain, visible = judge(
-            form, group, values, length, scales, slopes, gamma_errors, gamma_lasts
+            form, group, first, values, length, scratch, scales, slopes, gamma_errors, gamma_lasts
         )
         good = alive & is_good(error, group.allowed_error, quadrature_error, group.allowed_quadrature_error)
         limited = everywhere(group.allowed_quadrature_error, length) < INFINITY
@@ -197,10 +206,10 @@ def ends_of_steps(lanes: int) -> Any:
         quadrature_error = log_of_order(quadrature_error, group.quadrature_error_power)
         logarithm, in_doubt = as_errors_allow(
             error,
-            as_rows(group.previous_error, lanes)[0],
+            part(group.previous_error, first)[0],
             group.error_aim,
             quadrature_error,
-            as_rows(group.previous_quadrature_error, lanes)[0],
+            part(group.previous_quadrature_error, first)[0],
             group.quadrature_error_aim,
             limited,
             log_ratio(length / size(previous_length)),
@@ -208,11 +217,11 @@ def ends_of_steps(lanes: int) -> Any:
             quadrature_error_is_evident,
             0.0,
         )
-        limit = as_rows(group.length_limit, lanes)[0] * APPROACH
+        limit = part(group.length_limit, first)[0] * APPROACH
         factor = as_iterations_allow(
             bounded(logarithm, MOST_GROWTH),
             group.target_iterations,
-            iterations - as_rows(group.before, lanes)[0],
+            iterations - part(group.before, first)[0],
             length,
             limit,
         )
@@ -221,8 +230,8 @@ def ends_of_steps(lanes: int) -> Any:
         )
         free = (factor >= LIMITED_GROWTH) | ((room_left <= group.worth) & visible)
         following = h * factor
-        t, low = time_after(as_rows(group.t0, lanes)[0], as_rows(group.time_low, lanes)[0], h)
-        time_left, since = (as_rows(group.stop, lanes)[0] - t) - low, as_rows(group.since, lanes)[0] + 1.0
+        t, low = time_after(part(group.t0, first)[0], part(group.time_low, first)[0], h)
+        time_left, since = (part(group.stop, first)[0] - t) - low, part(group.since, first)[0] + 1.0
         good = (
             good
             & certain
@@ -232,23 +241,23 @@ def ends_of_steps(lanes: int) -> Any:
             & (size(time_left) > size(following))
             & (size(following) <= group.longest)
             & is_distinct(following, t)
-            & (since < as_rows(group.unwatched, lanes)[0])
+            & (since < part(group.unwatched, first)[0])
         )
-        as_rows(group.ordinary, lanes)[0] = where(good, 1.0, 0.0)
-        keep(group.t0, good, t)
-        keep(group.time_low, good, low)
-        keep(group.previous_error, good, error)
-        keep(group.previous_quadrature_error, good, quadrature_error)
-        keep(group.previous_length, good, h)
-        keep(group.length_limit, good, limit)
-        keep(group.h, good, following)
-        keep(group.ratio, good, factor)
-        keep(group.begin, good, 1.0)
-        keep(group.before, good, iterations)
-        keep(group.since, good, since)
-        keep_rows(group.state, good, group.next_state, dim)
-        keep_rows(group.error, good, group.next_error, dim)
-        keep_rows(group.ends, good, group.next_ends, rows)
-        keep_rows(group.last_coefficients, good, group.next_last_coefficients, rows)
+        part(group.ordinary, first)[0] = where(good, 1.0, 0.0)
+        keep(group.t0, first, good, t)
+        keep(group.time_low, first, good, low)
+        keep(group.previous_error, first, good, error)
+        keep(group.previous_quadrature_error, first, good, quadrature_error)
+        keep(group.previous_length, first, good, h)
+        keep(group.length_limit, first, good, limit)
+        keep(group.h, first, good, following)
+        keep(group.ratio, first, good, factor)
+        keep(group.begin, first, good, 1.0)
+        keep(group.before, first, good, iterations)
+        keep(group.since, first, good, since)
+        keep_rows(group.state, first, good, group.next_state, dim)
+        keep_rows(group.error, first, good, group.next_error, dim)
+        keep_rows(group.ends, first, good, group.next_ends, rows)
+        keep_rows(group.last_coefficients, first, good, group.next_last_coefficients, rows)
 
     return end_step

@@ -69,12 +69,13 @@ class Lanes:
         """Compile the steps around a function of stages of `rows` components."""
         self.system, self.second, self._constants = system, second, constants
         self.unit, self.varying, self.k = unit and not varying, varying, constants.k
-        self.width = width_for(system, second, self.rows, varying)
+        self.width = width_for(system, second, self.rows)
         unrolled = unrolled_for(system, second, self.k, self.rows)
+        register = LANES if machine.many_registers() else LANES // 2
         degrees = tables.degrees_judged(constants.k, constants.s)
         numbers = {
             "k": self.k, "rows": self.rows, "second": second, "unit": self.unit, "varying": varying,
-            "unrolled": unrolled, "held": unrolled and machine.many_registers(),
+            "unrolled": unrolled, "held": unrolled and register == self.width,
             **{f"blocks.{name}": value for name, value in blocks.items()},
             **{f"vectors.{name}": value for name, value in vectors.items()},
             **dict(zip(JUDGED, degrees, strict=True)),
@@ -84,7 +85,7 @@ class Lanes:
             system,
             quantity,
             self.width,
-            (self.width,),
+            (self.width, register),
             constants=form.words.tolist(),
             par=True,
             unrolled=unrolled,
@@ -194,24 +195,25 @@ def in_powers(k: int) -> Numbers:
     return factors
 
 
-def width_for(system: System, second: bool, rows: int, varying: bool) -> int:
+def width_for(system: System, second: bool, rows: int) -> int:
     """Return how many trajectories go side by side.
 
-    Eight, which fill a register where there are 32 of eight doubles; more where the field has few components
-    and the results of divisions, roots or other functions are waited for (Kepler: 15 % faster with
-    sixteen, an exponential of one component twice as fast with 32). Adaptive steps wait for those
-    of their control (Henon and Heiles: 8 % faster with sixteen). With 16 registers of AVX2 eight fill two
-    of them, and sixteen are faster only where one component waits for a function (Morse: 9 % with
-    adaptive and 15 % with fixed steps; a pendulum's sine: within 3 %). Kepler is 14 % slower with fixed and
-    6 % with adaptive steps, the double pendulum 36 %.
+    Eight, which fill a register where there are 32 of eight doubles; more where the field has few components,
+    for results are waited for: sixteen (Henon and Heiles: 15 % faster), or 32 where they are those of
+    divisions, roots or other functions (Kepler: 15 % faster with sixteen, and as much again with 32). With
+    sixteen the four rows of a double pendulum are 7 % slower.
+
+    With 16 registers of AVX2 eight fill two of them, and sixteen are faster only where one component waits
+    for a function (Morse: 9 % with adaptive and 15 % with fixed steps; a pendulum's sine: within 3 %). Kepler
+    is 14 % slower with fixed and 6 % with adaptive steps, the double pendulum 36 %.
     """
     nodes = reachable(system.function("force" if second else "field").roots)
     waits = any(node.op not in SHORT_LATENCY for node in nodes)
     if not machine.many_registers():
         return 2 * LANES if rows == 1 and waits else LANES
-    if rows > 4 or not (varying or waits):
+    if rows > 3:
         return LANES
-    return 4 * LANES if rows == 1 else 2 * LANES
+    return 4 * LANES if rows == 1 or (rows == 2 and waits) else 2 * LANES
 
 
 def unrolled_for(system: System, second: bool, k: int, rows: int) -> bool:

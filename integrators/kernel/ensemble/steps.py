@@ -19,7 +19,7 @@ from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.lanes import everywhere, somewhere
 from integrators.kernel.simd.memory import call_field, larger
 from integrators.kernel.simd.operations import fma, greatest, opposite, size, two_sum, where
-from integrators.kernel.simd.views import as_numbers, as_rows, rows_on_stack
+from integrators.kernel.simd.views import as_numbers, as_parts, as_rows, rows_on_stack
 from integrators.kernel.step.begin import INFINITY, on_previous_step
 from integrators.kernel.step.finish import added, moved_by
 from integrators.kernel.step.rule import (
@@ -57,13 +57,14 @@ def combination(form, table, i, values, last, d, start, starts):
 def measuring(lanes: int, own: Any) -> Any:
     """Return what sets the weights that turn changes of the values into those of the stages beside a block.
 
-    ``own(form, group, values, h, d, weight)`` is the size of a component and how far it moves. The size of a
-    block is the largest of its components'. Where every row is a block and the step size fixed, floored sizes
-    are at least how far a row of the group moves, as in `integrators.kernel.step.size.take_sizes`.
+    ``own(form, group, first, values, h, d, weight)`` is the size of a component and how far it moves. The
+    size of a block is the largest of its components'. Where every row is a block and the step size fixed,
+    floored sizes are at least how far a row of the group moves, as in
+    `integrators.kernel.step.size.take_sizes`.
     """
 
     @compiled
-    def measure(form, blocks, group, h, factor, values, sizes, block_weights, floored_weights):
+    def measure(form, blocks, group, first, h, factor, values, sizes, block_weights, floored_weights):
         zero = everywhere(0.0, h)
         least, norm = least_part(form.varying), group.matrix_norm
         count, width = blocks.count, blocks.width
@@ -74,7 +75,7 @@ def measuring(lanes: int, own: Any) -> Any:
                 top = zero
                 for d in range(start, start + width):
                     weight = everywhere(norm, h) if form.unit else size(factor[d]) * norm
-                    extent, moved = own(form, group, values, h, d, weight)
+                    extent, moved = own(form, group, first, values, h, d, weight)
                     top = greatest(top, extent)
                     if width == 1 and not form.varying:
                         farthest = greatest(farthest, moved)
@@ -91,44 +92,73 @@ def measuring(lanes: int, own: Any) -> Any:
     return measure
 
 
-def steps(lanes: int) -> Any:
-    """Return ``void(field, form, group, count)``, so many steps of a `Group` around a field."""
-    end_step = ends_of_steps(lanes)
+def steps(lanes: int, few: int) -> Any:
+    """Return ``void(field, form, group, count)``, so many steps of a `Group` around a field.
+
+    What begins and ends a step is done in ``few`` lanes after others, those of a register: results are not
+    waited for, as in the iterations, and with more lanes most numbers would go through memory.
+    """
+    end_varying_step = ends_of_steps(lanes, few)
 
     @compiled
-    def drift(form, group, d, kh):
+    def part(numbers, first):
+        """Return the rows of an array from lane ``first`` on, few lanes of each."""
+        return as_parts(numbers + first, few, lanes)
+
+    @compiled
+    def rows_from(rows, first):
+        """Return the same of rows of all lanes."""
+        return part(as_numbers(rows), first)
+
+    @compiled
+    def drift(form, group, first, d, kh):
         """Return kh (p + its error) as a sum of two doubles."""
         rows = form.rows
-        state, error = as_rows(group.state, lanes), as_rows(group.error, lanes)
+        state, error = part(group.state, first), part(group.error, first)
         return multiplied(kh, state[rows + d], error[rows + d])
 
     @compiled
-    def component_size(form, group, values, h, d, weight):
+    def component_size(form, group, first, values, h, d, weight):
         """Return the size of a component at the start and, about, at the end of a step; and its movement."""
-        y = as_rows(group.state, lanes)[d]
+        y = part(group.state, first)[d]
         if form.second:
-            moved, _ = drift(form, group, d, h * as_rows(group.velocity, lanes)[d])
+            moved, _ = drift(form, group, first, d, h * part(group.velocity, first)[d])
         else:
             moved = h * values[form.rows * (form.k - 1) + d]
         return greatest(size(y), size(y + moved)), size(moved)
 
     @compiled
-    def vector_size(form, group, values, h, d, weight):
+    def vector_size(form, group, first, values, h, d, weight):
         """As `component_size`; a vector is also as large as the newest values move the stages."""
-        extent, moved = component_size(form, group, values, h, d, weight)
+        extent, moved = component_size(form, group, first, values, h, d, weight)
         return greatest(extent, size(weight * values[form.rows * (form.k - 1) + d])), moved
 
-    measure = measuring(lanes, component_size)
-    measure_vectors = measuring(lanes, vector_size)
+    measure, measure_along = measuring(lanes, component_size), measuring(lanes, vector_size)
 
     @compiled
-    def begin(form, group, h, factor):
+    def measure_vectors(form, group, factor, values, sizes, block_weights, floored_weights):
+        for first in range(0, lanes, few):
+            measure_along(
+                form,
+                form.vectors,
+                group,
+                first,
+                part(group.h, first)[0],
+                rows_from(factor, first),
+                rows_from(values, first),
+                rows_from(sizes, first),
+                rows_from(block_weights, first),
+                rows_from(floored_weights, first),
+            )
+
+    @compiled
+    def begin(form, group, first, h, factor):
         """Set what stages have besides the state and the values; return the time of the step."""
         k, rows, second, varying = form.k, form.rows, form.second, form.varying
         error, velocity, base = (
-            as_rows(group.error, lanes),
-            as_rows(group.velocity, lanes),
-            as_rows(group.base, lanes),
+            part(group.error, first),
+            part(group.velocity, first),
+            part(group.base, first),
         )
         for d in range(rows):
             lacks = error[d]
@@ -136,7 +166,7 @@ def steps(lanes: int) -> Any:
                 kh = h * velocity[d]
                 if not form.unit:
                     factor[d] = h * kh if varying else kh
-                moved, moved_low = drift(form, group, d, kh)
+                moved, moved_low = drift(form, group, first, d, kh)
                 for i in range(k):
                     base[rows * i + d] = part_of_drift(
                         group.nodes[i], group.nodes_low[i], moved, moved_low, lacks
@@ -146,7 +176,7 @@ def steps(lanes: int) -> Any:
                     factor[d] = h
                 for i in range(k):
                     base[rows * i + d] = lacks
-        t0, low = as_rows(group.t0, lanes)[0], as_rows(group.time_low, lanes)[0]
+        t0, low = part(group.t0, first)[0], part(group.time_low, first)[0]
         return time_of_step(t0, low, float(group.n), h)
 
     @compiled
@@ -159,11 +189,11 @@ def steps(lanes: int) -> Any:
         return total
 
     @compiled
-    def predict(form, group, values, ahead):
+    def predict(form, group, first, values, ahead):
         """Set first values: the last step's polynomial at the nodes of this one."""
         k, rows = form.k, form.rows
         if form.varying:
-            predict_from_polynomial(form, group, values, ahead)
+            predict_from_polynomial(form, group, first, values, ahead)
             return
         table = load_anew(group, "extrapolation")
         for i in range(k):
@@ -174,15 +204,36 @@ def steps(lanes: int) -> Any:
             values[i] = ahead[i]
 
     @compiled
-    def predict_from_polynomial(form, group, values, ahead):
+    def predict_from_polynomial(form, group, first, values, ahead):
         """As `predict`, from the powers of the polynomial: this step's length may be another one."""
         k, rows = form.k, form.rows
-        ratio, start = as_rows(group.ratio, lanes)[0], as_rows(group.begin, lanes)[0]
+        ratio, start = part(group.ratio, first)[0], part(group.begin, first)[0]
         nowhere = ratio == 0.0
         for i in range(k):
             x = on_previous_step(group.nodes[i], start, ratio)
             for d in range(rows):
                 values[rows * i + d] = where(nowhere, 0.0, at(form, x, ahead, d))
+
+    @compiled
+    def begin_step(form, group, factor, values, ahead, sizes, block_weights, floored_weights, time):
+        """Set what the first iteration starts from, and in ``time`` the step's, as a sum of two doubles."""
+        for first in range(0, lanes, few):
+            h, factors, own = part(group.h, first)[0], rows_from(factor, first), rows_from(values, first)
+            times = rows_from(time, first)
+            times[0], times[1] = begin(form, group, first, h, factors)
+            measure(
+                form,
+                form.blocks,
+                group,
+                first,
+                h,
+                factors,
+                own,
+                rows_from(sizes, first),
+                rows_from(block_weights, first),
+                rows_from(floored_weights, first),
+            )
+            predict(form, group, first, own, rows_from(ahead, first))
 
     @compiled
     def iteration(
@@ -241,11 +292,11 @@ def steps(lanes: int) -> Any:
         return two_sum(first, last)
 
     @compiled
-    def keep(form, group, d, new, low, alive):
+    def keep(form, group, first, d, new, low, alive):
         """Set a component at the end of the step in lanes that are alive, and return which still are."""
-        state, error = as_rows(group.state, lanes), as_rows(group.error, lanes)
-        next_state = as_rows(group.next_state, lanes) if form.varying else state
-        next_error = as_rows(group.next_error, lanes) if form.varying else error
+        state, error = part(group.state, first), part(group.error, first)
+        next_state = part(group.next_state, first) if form.varying else state
+        next_error = part(group.next_error, first) if form.varying else error
         # The last iterations are not judged: in one component of a lane they may have left no number.
         good = alive & (new - new == 0.0)
         next_state[d] = where(good, new, state[d])
@@ -253,28 +304,49 @@ def steps(lanes: int) -> Any:
         return good
 
     @compiled
-    def finish(form, group, values, h, alive):
+    def finish(form, group, first, values, h, alive):
         """Set the state at the end, as a sum of two doubles, the displacement first; return who is alive."""
         rows, second = form.rows, form.second
-        state, error, zero = as_rows(group.state, lanes), as_rows(group.error, lanes), everywhere(0.0, h)
+        state, error, zero = part(group.state, first), part(group.error, first), everywhere(0.0, h)
         for d in range(rows):
             y, lacks = state[d], error[d]
             force, force_low = mean(form, values, d, group.weights, group.weights_low, zero)
             if second:
-                kh = h * as_rows(group.velocity, lanes)[d]
-                moved, moved_low = drift(form, group, d, kh)
+                kh = h * part(group.velocity, first)[d]
+                moved, moved_low = drift(form, group, first, d, kh)
                 p, p_lacks = state[rows + d], error[rows + d]
                 kick, kick_low = mean(
                     form, values, d, group.position_weights, group.position_weights_low, zero
                 )
                 new, low = moved_by(y, lacks, moved, moved_low, h, kh, kick, kick_low)
-                alive = keep(form, group, d, new, low, alive)
+                alive = keep(form, group, first, d, new, low, alive)
                 new, low = added(p, p_lacks, h, force, force_low)
-                alive = keep(form, group, rows + d, new, low, alive)
+                alive = keep(form, group, first, rows + d, new, low, alive)
             else:
                 new, low = added(y, lacks, h, force, force_low)
-                alive = keep(form, group, d, new, low, alive)
+                alive = keep(form, group, first, d, new, low, alive)
         return alive
+
+    @compiled
+    def end_step(form, group, values, scratch, moved, sizes, block_weights, floored_weights):
+        for first in range(0, lanes, few):
+            h, own = part(group.h, first)[0], rows_from(values, first)
+            alive = finish(form, group, first, own, h, part(group.alive, first)[0] > 0.0)
+            part(group.alive, first)[0] = where(alive, 1.0, 0.0)
+            if form.varying:
+                end_varying_step(
+                    form,
+                    group,
+                    first,
+                    own,
+                    h,
+                    alive,
+                    scratch,
+                    rows_from(sizes, first),
+                    rows_from(moved, first),
+                    rows_from(block_weights, first),
+                    rows_from(floored_weights, first),
+                )
 
     @compiled
     def run(field, constants, address, count):
@@ -294,6 +366,7 @@ def steps(lanes: int) -> Any:
         kept = rows_on_stack(state, of_stages) if held else values
         ahead = rows_on_stack(state, of_stages) if unrolled and not varying else as_rows(group.ahead, lanes)
         newest, time = rows_on_stack(state, rows) if unrolled else values, rows_on_stack(state, 1)
+        clock, scratch = rows_on_stack(state, 2), rows_on_stack(part(group.state, 0), 2 * form.k)
         h = as_rows(group.h, lanes)[0]
         zero, infinite = everywhere(0.0, h), everywhere(INFINITY, h)
         if held:
@@ -303,9 +376,8 @@ def steps(lanes: int) -> Any:
         iterations, rate = as_rows(group.iterations, lanes)[0], as_rows(group.rate, lanes)[0]
         taken = 0
         while True:
-            t, t_low = begin(form, group, h, factor)
-            measure(form, form.blocks, group, h, factor, kept, sizes, block_weights, floored_weights)
-            predict(form, group, kept, ahead)
+            begin_step(form, group, factor, kept, ahead, sizes, block_weights, floored_weights, clock)
+            t, t_low = clock[0], clock[1]
             last, best, stalled = infinite, infinite, zero
             left = infinite  # iterations still to be made; infinite: that is not known
             again = zero > 0.0
@@ -329,9 +401,7 @@ def steps(lanes: int) -> Any:
                     time,
                 )
                 if form.vectors.groups:
-                    measure_vectors(
-                        form, form.vectors, group, h, factor, kept, sizes, block_weights, floored_weights
-                    )
+                    measure_vectors(form, group, factor, kept, sizes, block_weights, floored_weights)
                 tried += 1
                 iterations = where(active, iterations + 1.0, iterations)
                 left = left - 1.0
@@ -374,11 +444,10 @@ def steps(lanes: int) -> Any:
                 active = active & (left > 0.0)
                 if not somewhere(active):
                     break
-            alive = finish(form, group, kept, h, alive)
-            if varying:
-                end_step(
-                    form, group, kept, h, alive, iterations, sizes, moved, block_weights, floored_weights
-                )
+            as_rows(group.alive, lanes)[0] = where(alive, 1.0, 0.0)
+            as_rows(group.iterations, lanes)[0] = iterations
+            end_step(form, group, kept, scratch, moved, sizes, block_weights, floored_weights)
+            alive = as_rows(group.alive, lanes)[0] > 0.0
             taken += 1
             group.n += 1
             if not somewhere(alive & (everywhere(float(count - taken), h) > 0.0)):
@@ -386,8 +455,6 @@ def steps(lanes: int) -> Any:
         if held:
             for i in range(of_stages):
                 values[i] = kept[i]
-        as_rows(group.alive, lanes)[0] = where(alive, 1.0, 0.0)
-        as_rows(group.iterations, lanes)[0] = iterations
         as_rows(group.rate, lanes)[0] = rate
         group.living = 1 if somewhere(alive) else 0
 

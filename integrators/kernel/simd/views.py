@@ -225,7 +225,7 @@ def rows_on_stack(typing, like, n):
         memory.align = _aligned(like.count)
         return builder.bitcast(memory, DOUBLE.as_pointer())
 
-    return like(like, types.intp), generate
+    return Rows(like.count)(like, types.intp), generate
 
 
 @intrinsic(prefer_literal=True)
@@ -246,6 +246,15 @@ def as_rows(typing, numbers, lanes):
     if not isinstance(lanes, types.IntegerLiteral):
         return None
     return Rows(lanes.literal_value)(DOUBLES, lanes), lambda context, builder, sig, args: args[0]
+
+
+@intrinsic(prefer_literal=True)
+def as_parts(typing, numbers, count, lanes):
+    """Return memory of rows of ``lanes`` as rows of the first ``count`` of each (literals)."""
+    if not (isinstance(count, types.IntegerLiteral) and isinstance(lanes, types.IntegerLiteral)):
+        return None
+    kind = Rows(count.literal_value, lanes.literal_value)
+    return kind(DOUBLES, count, lanes), lambda context, builder, sig, args: args[0]
 
 
 @intrinsic
