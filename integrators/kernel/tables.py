@@ -106,17 +106,8 @@ def constants(k: int, s: int, second: bool, lanes: int) -> Constants:
     route = route_for(k, s, lanes)
     shapes = _shapes(k, s, route)
     name = store.key("tables", f"{k} {s} {second} {route}", binary.sources(__name__))
-    kept = store.get(name)
-    if kept is None or len(kept) != 8 * sum(rows * columns for rows, columns in shapes):
-        parts = _make(k, s, second, route)
-        kept = b"".join(parts[part].astype("<f8").tobytes() for part in NAMES)
-        store.put(name, kept)
-    # Read back even if just made: what is computed from the tables depends on their layout, in the last bit.
-    arrays: dict[str, Array] = {}
-    start = 0
-    for part, (rows, columns) in zip(NAMES, shapes, strict=True):
-        arrays[part] = np.frombuffer(kept, "<f8", rows * columns, start).reshape(rows, columns)
-        start += 8 * rows * columns
+    parts = store.arrays(name, shapes, lambda: [*map(_make(k, s, second, route).__getitem__, NAMES)])
+    arrays: dict[str, Array] = dict(zip(NAMES, parts, strict=True))
     return Constants(k, s, lanes, second, route, min(k, MODES_VARYING), arrays)
 
 

@@ -84,16 +84,13 @@ def method(k: int, s: int, second: bool, lanes: int, kind: int) -> Method:
 def _tables(k: int, s: int) -> tuple[Array, Array, Array, Array]:
     """Return integrals, the low parts of their first columns, the basis and X_s, kept on disk."""
     shapes = [(k, s), (k, min(LOW, s)), (k, s), (s, s)]
-    ends = np.cumsum([rows * columns for rows, columns in shapes])
-    name = store.key("implicit", f"{k} {s}", binary.sources(__name__))
-    kept = store.get(name)
-    if kept is None or len(kept) != 8 * ends[-1]:
+
+    def make() -> list[Array]:
         from integrators.coefficients import legendre  # 50 digits, which take their time to be imported
 
         t = legendre.tables(k, s)
-        parts = [t.integrals.hi, t.integrals.lo[:, : min(LOW, s)], t.basis.hi, t.x.hi]
-        store.put(name, b"".join(part.astype("<f8").tobytes() for part in parts))
-    else:
-        flat = np.split(np.frombuffer(kept, "<f8"), ends[:-1])
-        parts = [part.reshape(shape) for part, shape in zip(flat, shapes, strict=True)]
-    return parts[0], parts[1], parts[2], parts[3]
+        return [t.integrals.hi, t.integrals.lo[:, : min(LOW, s)], t.basis.hi, t.x.hi]
+
+    name = store.key("implicit", f"{k} {s}", binary.sources(__name__))
+    integrals, low, basis, x = store.arrays(name, shapes, make)
+    return integrals, low, basis, x

@@ -13,6 +13,9 @@ from numpy.typing import NDArray
 
 Integers = NDArray[np.int64]
 
+STEP = 1.4901161193847656e-08  # sqrt(eps): where the errors of a difference balance
+SMALL = 1e-5  # of the largest component: no difference is taken over less
+
 
 @dataclass(frozen=True)
 class Groups:

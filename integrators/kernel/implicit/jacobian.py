@@ -1,5 +1,6 @@
 """The Jacobian at a state, entry by entry, and the factors of the corrections' matrices."""
 
+from integrators.kernel.implicit.groups import SMALL, STEP
 from integrators.kernel.implicit.linear import factor, solve
 from integrators.kernel.implicit.memory import FACTORIZE, SOLVE, Corrections
 from integrators.kernel.native.attributes import view
@@ -8,8 +9,6 @@ from integrators.kernel.simd.lanes import fma
 from integrators.kernel.simd.memory import call_factors, call_field, get, put, splat8, spread
 
 workspace = view(Corrections)
-STEP = 1.4901161193847656e-08  # sqrt(eps): where the errors of a difference balance
-SMALL = 1e-5  # of the largest component: no difference is taken over less
 POWERS = 6  # multiplications by the Jacobian that find its spectral radius to 20 % or so
 
 

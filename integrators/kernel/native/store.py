@@ -10,8 +10,12 @@ import contextlib
 import hashlib
 import os
 import tempfile
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from problems.targets.cache import directory, locked
 
@@ -71,3 +75,17 @@ def put(name: str, content: bytes) -> bool:
                 Path(temporary).unlink()
         return False
     return True
+
+
+def arrays(name: str, shapes: Sequence[tuple[int, int]], make: Callable[[], Sequence[Any]]) -> list[Any]:
+    """Return arrays of doubles that are kept under a key, or made and kept now.
+
+    They are read back even if just made: what is computed from them depends on their layout, in the last bit.
+    """
+    ends = np.cumsum([rows * columns for rows, columns in shapes])
+    kept = get(name)
+    if kept is None or len(kept) != 8 * ends[-1]:
+        kept = b"".join(part.astype("<f8").tobytes() for part in make())
+        put(name, kept)
+    parts = np.split(np.frombuffer(kept, "<f8"), ends[:-1])
+    return [part.reshape(shape) for part, shape in zip(parts, shapes, strict=True)]

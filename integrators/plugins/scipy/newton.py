@@ -12,11 +12,8 @@ from scipy.linalg import lu_factor, lu_solve
 from scipy.sparse.linalg import splu
 
 from integrators.coefficients.legendre import x_matrix
+from integrators.kernel.implicit.groups import SMALL, STEP, groups
 from problems.errors import InputError
-
-# Of differences, as in `integrators.kernel.implicit.jacobian`.
-STEP = float(np.sqrt(np.finfo(float).eps))  # where the errors of a difference balance
-SMALL = 1e-5  # of the largest component: no difference is taken over less
 
 Array = NDArray[Any]
 
@@ -129,7 +126,8 @@ class Newton:
 
     @cached_property
     def _groups(self) -> NDArray[np.intp]:
-        return np.arange(self._solver.n) if self._pattern is None else grouped(self._pattern)
+        n, pattern = self._solver.n, self._pattern
+        return np.arange(n) if pattern is None else groups(pattern.row, pattern.col, n)
 
     def _checked(self, matrix: Any, name: str) -> Any:
         kind, n = self._solver.y.dtype, self._solver.n
@@ -139,22 +137,3 @@ class Newton:
                 f"`{name}` is expected to have shape {(n, n)}, but actually has {checked.shape}."
             )
         return checked
-
-
-def grouped(pattern: Any) -> NDArray[np.intp]:
-    """Return the group of each column, such that no two columns of a group have a row in common.
-
-    Each column goes to the first group with room for it (A. R. Curtis, M. J. D. Powell, J. K. Reid,
-    *On the estimation of sparse Jacobian matrices*, 1974).
-    """
-    columns = pattern.tocsc()
-    taken = np.zeros((0, columns.shape[0]), dtype=bool)  # rows, by group
-    groups = np.empty(columns.shape[1], dtype=np.intp)
-    for j in range(groups.size):
-        rows = columns.indices[columns.indptr[j] : columns.indptr[j + 1]]
-        free = np.flatnonzero(~taken[:, rows].any(axis=1))
-        if not free.size:
-            free, taken = np.array([len(taken)]), np.vstack([taken, np.zeros(columns.shape[0], dtype=bool)])
-        groups[j] = free[0]
-        taken[groups[j], rows] = True
-    return groups
