@@ -13,20 +13,18 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
 from threading import Event
-from typing import Any, Protocol, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from integrators.events.finder import Ending
-from integrators.kernel.adaptive import Adaptive as AdaptiveSteps
 from integrators.kernel.context import Context
 from integrators.kernel.engines import run, run_own
 from integrators.kernel.ensemble.group import LEFT
 from integrators.kernel.ensemble.prepared import Lanes
 from integrators.kernel.pace import Pace
-from integrators.kernel.plan import Plan
-from integrators.kernel.stepper import HBVMStepper
+from integrators.kernel.stepper import HBVMStepper, Program
 from integrators.kernel.tangent.lanes import VectorLanes
 from integrators.options import Count
 from integrators.protocol import Array, Samples, Status, Trajectories, UserError, telling
@@ -34,7 +32,6 @@ from integrators.refusals import check_batch, check_times
 from integrators.running.times import Counts, plan
 from problems.checks import checked
 from problems.errors import unknown
-from problems.problem import System
 
 CHUNK = 1 << 14  # steps between two looks at Ctrl-C, at most
 JOBS = 8  # for each thread, at least, where there are so many groups: for even loads
@@ -58,21 +55,8 @@ class Batch(Trajectories):
     evaluations: Counts
 
 
-class BatchProgram(Protocol):
-    """What a batch asks of its program."""
-
-    system: System
-    h: float
-    plan: Plan
-    adaptive: AdaptiveSteps | None
-
-    def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> HBVMStepper: ...
-    def in_lanes(self) -> Lanes | None: ...
-    def contexts(self, par: Array) -> tuple[Context, Context]: ...
-
-
 def prepare_batch(
-    program: BatchProgram,
+    program: Program,
     Y0: ArrayLike,
     par: ArrayLike | None,
     times: ArrayLike,
@@ -107,7 +91,7 @@ def nothing_yet(times: Array, n: int, dim: int) -> Batch:
 class Work:
     """A batch under way; its trajectories may run on several threads."""
 
-    program: BatchProgram
+    program: Program
     result: Batch
     starts: Array
     parameters: Array
@@ -319,7 +303,7 @@ class Adaptive(_InLanes):
 
 
 def batch_along(
-    program: BatchProgram, lanes: VectorLanes, Y0: ArrayLike, par: ArrayLike | None, times: ArrayLike,
+    program: Program, lanes: VectorLanes, Y0: ArrayLike, par: ArrayLike | None, times: ArrayLike,
     t0: float, directions: Directions, threads: int,
 ) -> Batch:  # fmt: skip
     """Integrate every start, and the vectors along it, to all times. See `HBVMProgram.batch_along`.

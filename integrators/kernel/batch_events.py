@@ -5,37 +5,26 @@ A trajectory that leaves its lane is searched by itself, from its start.
 
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from integrators.events.finder import Ending, ended_by
 from integrators.events.members import ending_of
-from integrators.kernel.batch import Adaptive, Batch, BatchProgram, Work, nothing_yet
-from integrators.kernel.context import Context, Shape
+from integrators.kernel.batch import Adaptive, Batch, Work, nothing_yet
+from integrators.kernel.context import Context
 from integrators.kernel.engines import look
 from integrators.kernel.ensemble.group import ACCUMULATES, BY_EVENT
 from integrators.kernel.ensemble.prepared import Lanes
 from integrators.kernel.inside.search import Log, Sought, room_for
 from integrators.kernel.pace import FEWEST, Pace
-from integrators.kernel.stepper import CHUNK_WITH_EVENTS, HBVMStepper, accumulated
+from integrators.kernel.stepper import CHUNK_WITH_EVENTS, HBVMStepper, Program, accumulated
 from integrators.protocol import Samples, Status
 from integrators.refusals import check_batch, check_times
 from integrators.solution.occurrences import Occurrences
 
 HITS = 128  # of a step of a lane, at most; a trajectory with more leaves it
-
-
-class Program(BatchProgram, Protocol):
-    """What trajectories with events ask of their program."""
-
-    varying: bool
-    shape: Shape
-
-    @property
-    def renews(self) -> bool: ...
-    def program_of_lanes(self) -> "Program": ...
 
 
 @dataclass(frozen=True, eq=False)

@@ -176,9 +176,7 @@ class HBVMProgram(Compiled):
         """
         values = check_parameters(par, self.system)
         state, time = check_state(y0, self.system.dim), check_start(t0)
-        if self.adaptive is None:
-            return FixedStepper(self, state, values, time)
-        return AdaptiveStepper(self, self.adaptive, state, values, time)
+        return (FixedStepper if self.adaptive is None else AdaptiveStepper)(self, state, values, time)
 
     def with_events(self, problem: Problem, events: Mapping[str, Event]) -> WithEvents:
         """Compile the functions of events; return what starts a trajectory that looks for them.

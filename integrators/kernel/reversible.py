@@ -1,7 +1,5 @@
 """Steps that are the same backwards: their lengths follow the field's time scale along the trajectory."""
 
-from typing import Protocol
-
 import numpy as np
 
 from integrators.kernel.adaptive import Adaptive
@@ -9,7 +7,7 @@ from integrators.kernel.context import Context, Shape
 from integrators.kernel.native import field as fields
 from integrators.kernel.plan import Plan
 from integrators.kernel.step.rule import LOG_RESIDUAL
-from integrators.kernel.stepper import HBVMStepper
+from integrators.kernel.stepper import Program
 from integrators.protocol import Array
 from problems import targets
 from problems.problem import System
@@ -22,12 +20,6 @@ MOST_EPSILON = 0.2
 """Reversible steps are no longer than this part of the field's time scale, whose density longer ones lose."""
 
 
-class Ordinary(Protocol):
-    """A program of adaptive steps."""
-
-    def start(self, y0: Array, par: Array | None = None, t0: float = 0.0) -> HBVMStepper: ...
-
-
 class Reversible(Adaptive):
     """What reversible steps of a plan have besides.
 
@@ -37,11 +29,11 @@ class Reversible(Adaptive):
         Traced, not of the time.
     plan, shape
         As for `Adaptive`, k = s.
-    ordinary : Ordinary
+    ordinary : Program
         The same with adaptive steps: `SCOUTED` of them tell how long these are.
     """
 
-    def __init__(self, system: System, plan: Plan, shape: Shape, ordinary: Ordinary):
+    def __init__(self, system: System, plan: Plan, shape: Shape, ordinary: Program):
         super().__init__(system, plan, shape)
         self._scale = time_scale(system.function("field"), system.n_par)
         self._pace = fields.compile_field(system, self._scale, shape.constants.lanes)

@@ -12,6 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from integrators.kernel.adaptive import Adaptive
 from integrators.kernel.adjoint.gradient import Adjoint, Records
 from integrators.kernel.context import (
     ACCUMULATE,
@@ -28,8 +29,10 @@ from integrators.kernel.context import (
     RESET,
     SCATTERED,
     Context,
+    Shape,
 )
 from integrators.kernel.engines import solver, steps
+from integrators.kernel.ensemble.prepared import Lanes
 from integrators.kernel.implicit.workspace import Solver, Workspace, report
 from integrators.kernel.inside.search import KernelSearch, Sought
 from integrators.kernel.line.kept import Kept
@@ -79,27 +82,32 @@ Filled = tuple[Array, int, Ended | None]  # samples, how the kernel came back, a
 
 
 class Program(Protocol):
-    """What a stepper asks of its program; see `integrators.kernel.program`."""
+    """What steppers and batches ask of their program; see `integrators.kernel.program`."""
 
     system: System
+    plan: Plan
     h: float
+    shape: Shape
     constants: Constants
     solver: Solver
     second: bool
     varying: bool
     field: binary.Native
+    adaptive: Adaptive | None
+    kept: Kept | None
+    vectors: dict[tuple[int, bool], Context]
     compile_seconds: float
 
     @property
     def description(self) -> str: ...
     @property
     def lanes(self) -> bool: ...
+    @property
+    def renews(self) -> bool: ...
 
-    kept: Kept | None
-    plan: Plan
-
-    vectors: dict[tuple[int, bool], Context]
-
+    def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> "HBVMStepper": ...
+    def program_of_lanes(self) -> "Program": ...
+    def in_lanes(self) -> Lanes | None: ...
     def contexts(self, par: Array) -> tuple[Context, Context]: ...
     def begin(self, own: Context, partial: Context, y: Array, par: Array, t0: float) -> None: ...
     def renew(self, own: Context, partial: Context, par: Array) -> None: ...

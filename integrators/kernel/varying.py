@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from integrators.kernel.adaptive import Adaptive
 from integrators.kernel.context import (
     ANEW,
     ATTEMPT,
@@ -54,8 +53,9 @@ class AdaptiveStepper(HBVMStepper):
     _given: Array | None = None  # sizes to take where they are asked for, of one that looks ahead
     _reached: Array | None = None  # times and sizes that it has seen
 
-    def __init__(self, program: Program, adaptive: Adaptive, y: Array, par: Array, t0: float):
-        self._adaptive, self._breakpoints = adaptive, adaptive.breakpoints(par)
+    def __init__(self, program: Program, y: Array, par: Array, t0: float):
+        assert program.adaptive is not None
+        self._adaptive, self._breakpoints = program.adaptive, program.adaptive.breakpoints(par)
         self._max_steps = program.plan.max_steps
         self._origin = self._goal = t0
         self._in_vain = 1
@@ -306,7 +306,7 @@ class AdaptiveStepper(HBVMStepper):
 
     def _scout(self, y: Array) -> "AdaptiveStepper":
         """Return a trajectory from a state now."""
-        scout = AdaptiveStepper(self._program, self._adaptive, y, self._context.par.copy(), self.t)
+        scout = AdaptiveStepper(self._program, y, self._context.par.copy(), self.t)
         scout.destination = self._goal
         return scout
 

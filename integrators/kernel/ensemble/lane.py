@@ -5,7 +5,7 @@ from integrators.kernel.ensemble.group import ARRIVED, LEFT
 from integrators.kernel.inside.discontinuities import confirm_previous_step
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
-from integrators.kernel.step.sample import place
+from integrators.kernel.step.stages import place
 from integrators.kernel.trajectory.vary import remaining
 
 context_at = view(Context)

@@ -23,8 +23,8 @@ from integrators.kernel.simd.memory import call_steps, put, splat8
 from integrators.kernel.step.begin import INFINITY, can_extrapolate
 from integrators.kernel.step.control import error_power, is_distinct
 from integrators.kernel.step.rule import FIRST_RATE, SMALLEST
-from integrators.kernel.step.sample import place
 from integrators.kernel.step.size import speed_of
+from integrators.kernel.step.stages import place
 from integrators.kernel.trajectory.anew import reset
 from integrators.kernel.trajectory.vary import (
     LIMITED_STEPS,

@@ -22,7 +22,7 @@ from integrators.kernel.simd.memory import call_look, get, put
 from integrators.kernel.step.begin import INFINITY, set_factors
 from integrators.kernel.step.estimate import estimate
 from integrators.kernel.step.rule import FIRST_RATE
-from integrators.kernel.step.sample import place
+from integrators.kernel.step.stages import place
 from integrators.kernel.trajectory.vary import begin_attempts
 
 search_at = view(Search)

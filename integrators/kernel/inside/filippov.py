@@ -14,7 +14,8 @@ from integrators.kernel.parts.surfaces import AT_STEP_END
 from integrators.kernel.simd.memory import call_field
 from integrators.kernel.step.control import INFINITY
 from integrators.kernel.step.rounding import rounding_of
-from integrators.kernel.step.sample import place, put_in_lanes, velocity
+from integrators.kernel.step.sample import put_in_lanes, velocity
+from integrators.kernel.step.stages import place
 
 NEAR, FAR = 2.0**-28, 2.0**-20  # of how far states move in a step: distances from the surface
 STAYS = 0.5  # of a speed at the larger distance is left at the smaller one, if it does not vanish

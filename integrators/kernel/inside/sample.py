@@ -5,6 +5,7 @@ from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.lanes import fma
 from integrators.kernel.simd.memory import call_field, get, put, splat8, spread
 from integrators.kernel.step.rounding import rounding_of
+from integrators.kernel.step.stages import momentum_place
 
 NUDGE = 1e-6  # relative change of a component that shows how a function depends on it
 NAN = float("nan")
@@ -92,7 +93,7 @@ def interpolate8(ctx, search, c, terms, table, block):
     for d in range(rows):
         moved = h * combine8(search, d, terms, table)
         if ctx.second:
-            i = 8 * (d // 4) + d % 4
+            i = momentum_place(d)
             drift = c * (ctx.factors.drift[i] * state[i])
             bent = (ctx.factors.row[d] * h) * combine8(search, d, terms, table + 8)
             put(block, 8 * d, state[i + 4] + (drift + (error[i + 4] + bent)))

@@ -23,7 +23,7 @@ from integrators.kernel.step.fixed_point import (
 from integrators.kernel.step.rule import FARTHEST
 from integrators.kernel.step.share import share
 from integrators.kernel.step.size import take_sizes
-from integrators.kernel.step.stages import offset
+from integrators.kernel.step.stages import momentum_place, offset
 from integrators.kernel.step.sums import multiplied, part_of_drift, time_of_step
 
 INFINITY = float("inf")
@@ -39,8 +39,8 @@ def set_factors(ctx, h):
         for d in range(ctx.rows):
             kh = h * velocity[d]
             factor[d] = kh
-            drift[8 * (d // 4) + d % 4] = kh
-            kick[8 * (d // 4) + 4 + d % 4] = kh
+            drift[momentum_place(d)] = kh
+            kick[momentum_place(d) + 4] = kh
 
 
 @compiled

@@ -13,7 +13,7 @@ from integrators.kernel.simd.memory import call_line, get, largest, put, splat8,
 from integrators.kernel.simd.operations import fma, two_sum
 from integrators.kernel.step.projection import project_onto_energy
 from integrators.kernel.step.share import largest_result, share
-from integrators.kernel.step.stages import offset
+from integrators.kernel.step.stages import momentum_place, offset
 from integrators.kernel.step.sums import multiplied
 
 
@@ -108,7 +108,7 @@ def finish_by_increment(ctx):
     damage = 0.0
     for d in range(rows):
         if ctx.second:
-            i = 8 * (d // 4) + d % 4
+            i = momentum_place(d)
             damage += add(ctx, i + 4, increment[d])
             damage += add(ctx, i, increment[rows + d])
         else:

@@ -16,6 +16,7 @@ from math import exp, log
 
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.memory import call_field
+from integrators.kernel.step.stages import place
 
 NEWTON = 8  # iterations; 4 suffice for growth by factors of 1/3 to 3
 
@@ -24,14 +25,10 @@ NEWTON = 8  # iterations; 4 suffice for growth by factors of 1/3 to 3
 def find_slope(ctx):
     """Set what the logarithm of the density grows by at the state; return the field's rate there."""
     pace = ctx.pace
-    state, lanes, rows, values = pace.state, ctx.lanes, ctx.rows, pace.values
+    state, lanes, values = pace.state, ctx.lanes, pace.values
     for d in range(pace.rows):
-        index = d
-        if ctx.second:
-            i = d % rows
-            index = 8 * (i // 4) + i % 4 + (4 if d < rows else 0)
         for lane in range(lanes):
-            state[lanes * d + lane] = ctx.state[index]
+            state[lanes * d + lane] = ctx.state[place(ctx, d)]
     call_field(pace.code, pace.times, state, pace.par, values)
     pace.density_slope = values[lanes]
     return values[0] ** 0.25

@@ -19,8 +19,7 @@ from integrators.kernel.step.coefficients import coefficient
 from integrators.kernel.step.control import INFINITY
 from integrators.kernel.step.fixed_point import evaluate
 from integrators.kernel.step.rule import STAGNATION
-from integrators.kernel.step.sample import place
-from integrators.kernel.step.stages import offset
+from integrators.kernel.step.stages import offset, place
 from problems.analysis.roundoff import ROUNDING, UNIT
 
 # Times the measured noise that a coefficient may be. That is the largest of four coefficients, on the less

@@ -3,21 +3,13 @@
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.memory import get, put
 from integrators.kernel.step.fixed_point import project
+from integrators.kernel.step.stages import momentum_place, place
 
 
 @compiled
 def dimension(ctx):
     """Return the length of the state."""
     return ctx.rows * (2 if ctx.second else 1)
-
-
-@compiled
-def place(ctx, d):
-    """Return where component d of (q, p), or of y, is in a state."""
-    if ctx.second == 0:
-        return d
-    rows = ctx.rows
-    return 8 * (d // 4) + 4 + d % 4 if d < rows else 8 * ((d - rows) // 4) + (d - rows) % 4
 
 
 @compiled
@@ -97,7 +89,7 @@ def interpolate(ctx, c, out):
         before, legendre = legendre, after
     for d in range(rows):
         if second:
-            i = 8 * (d // 4) + d % 4
+            i = momentum_place(d)
             drift = c * (ctx.factors.drift[i] * state[i])
             out[d] = state[i + 4] + (drift + out[d])
             out[rows + d] = state[i] + out[rows + d]

@@ -37,16 +37,10 @@ from integrators.kernel.step.iterate import iterate_to_end, test
 from integrators.kernel.step.sample import copy, vectors_of_state, write
 from integrators.kernel.step.size import take_sizes
 from integrators.kernel.step.solver_switch import solve_implicitly
-from integrators.kernel.step.stages import offset
+from integrators.kernel.step.stages import offset, place
 from integrators.kernel.tangent.memory import Tangents
 
 context, tangents = view(Context), view(Tangents)
-
-
-@compiled
-def position(ctx, d):
-    """Return where position d is in a state in second-order form."""
-    return 8 * (d // 4) + 4 + d % 4
 
 
 @compiled
@@ -68,7 +62,7 @@ def pull_stages(ctx, vectors, pulls):
     for chunk in range(ctx.chunks):
         source, target = offset(ctx, chunk), offset(vectors, chunk)
         for d in range(vectors.rows):
-            moved = get(ctx.stages, source + lanes * (d % rows)) - spread(ctx.state, position(ctx, d % rows))
+            moved = get(ctx.stages, source + lanes * (d % rows)) - spread(ctx.state, place(ctx, d % rows))
             i = target + lanes * d
             put(vectors.scratch.base, i, get(vectors.scratch.base, i) + pulls[d] * moved)
 
@@ -77,8 +71,8 @@ def pull_stages(ctx, vectors, pulls):
 def pull_end(ctx, vectors, pulls):
     """Add the same to the end of the step."""
     for d in range(vectors.rows):
-        i = position(ctx, d % ctx.rows)
-        vectors.next_state[position(vectors, d)] += pulls[d] * (ctx.next_state[i] - ctx.state[i])
+        i = place(ctx, d % ctx.rows)
+        vectors.next_state[place(vectors, d)] += pulls[d] * (ctx.next_state[i] - ctx.state[i])
 
 
 @compiled

@@ -13,7 +13,8 @@ added, and positions and velocities carry along what their last addition rounded
 The steps of the kernel cannot be used: REBOUND evaluates the forces of one stage at a time, at positions,
 velocities and a time that lie in its particles, and may add or remove bodies between two steps. The order of
 the error, the error that is estimated and what ends the iteration are the kernel's
-(`integrators.kernel.tolerance`, `integrators.plugins.rule`).
+(`integrators.kernel.tolerance`, `integrators.plugins.rule`). A step's length follows from its own error
+alone: what was before may have been another simulation's.
 """
 
 import numpy as np
