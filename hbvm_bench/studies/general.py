@@ -1,5 +1,7 @@
 """The systems of the campaign ``general.toml`` that are not of the catalogue: they conserve nothing."""
 
+import math
+
 from problems import Hamiltonian, Problem, VectorField
 
 
@@ -77,6 +79,51 @@ def hires() -> Problem:
         name="hires",
     )
     return Problem(system, y0=[1.0, 0, 0, 0, 0, 0, 0, 0.0057], t_end=321.8122, title="HIRES")
+
+
+def reaction_diffusion(n: int = 40) -> Problem:
+    """Return the Brusselator with diffusion on n points of a line: five diagonals of the Jacobian.
+
+    The system BRUSS of E. Hairer and G. Wanner, Solving Ordinary Differential Equations II, section IV.10,
+    with the two concentrations of a point side by side.
+    """
+    rate = (n + 1) ** 2 / 50
+
+    def field(y):
+        u, v = [1.0, *(y[2 * i] for i in range(n)), 1.0], [3.0, *(y[2 * i + 1] for i in range(n)), 3.0]
+        return [
+            slope
+            for i in range(1, n + 1)
+            for slope in (
+                1 + u[i] ** 2 * v[i] - 4 * u[i] + rate * (u[i - 1] - 2 * u[i] + u[i + 1]),
+                3 * u[i] - u[i] ** 2 * v[i] + rate * (v[i - 1] - 2 * v[i] + v[i + 1]),
+            )
+        ]
+
+    system = VectorField(field, dim=2 * n, name=f"reaction_diffusion_{n}")
+    points = [i / (n + 1) for i in range(1, n + 1)]
+    start = [value for x in points for value in (1 + math.sin(2 * math.pi * x), 3.0)]
+    return Problem(system, y0=start, t_end=10.0, title=f"Brusselator with diffusion, {n} points")
+
+
+def plate(n: int = 9) -> Problem:
+    """Return u' = (u_xx + u_yy) / 2 + 40 u (1 - u), a reaction that spreads, on n times n points."""
+    rate = 0.5 * (n + 1) ** 2
+
+    def field(y):
+        def at(i, j):
+            return y[n * i + j] if 0 <= i < n and 0 <= j < n else 0.0
+
+        return [
+            rate * (at(i - 1, j) + at(i + 1, j) + at(i, j - 1) + at(i, j + 1) - 4 * at(i, j))
+            + 40 * at(i, j) * (1 - at(i, j))
+            for i in range(n)
+            for j in range(n)
+        ]
+
+    system = VectorField(field, dim=n * n, name=f"plate_{n}")
+    start = [1.0 if i < n // 2 and j < n // 2 else 0.1 for i in range(n) for j in range(n)]
+    return Problem(system, y0=start, t_end=0.2, title=f"a reaction on {n} x {n} points")
 
 
 def lorenz() -> Problem:

@@ -24,6 +24,7 @@ POSITION_ERRORS = (1e-3, 1e-6, 1e-9, 1e-12)
 ENERGY_AND_POSITION = tuple((10.0**-digits, 10.0 ** (3 - digits)) for digits in range(8, 15))
 """From loose to tight; the position error may be a thousand times the energy error."""
 LEVELS = {"position error": POSITION_ERRORS, "energy and position error": ENERGY_AND_POSITION}
+OUTSIDE = "outside its domain"
 LESS_ACCURATE = "less accurate"
 COLUMNS = (
     *("processor", "place", "problem", "level", "family", "setting", "seconds"),
@@ -40,6 +41,8 @@ def ratios(
     defaults: bool = False,
 ) -> Frame:
     """Return a row for each processor, problem, level of errors and family but HBVM and Gauss.
+
+    Settings that the campaign calls outside of their method's domain take no part.
 
     ``ratio`` is the median, within the interleaved rounds, of the family's time over that of HBVM and Gauss,
     ``low`` and ``high`` are its quartiles; NaN where there is none, and ``why`` says so.
@@ -60,6 +63,7 @@ def ratios(
     import pandas as pd
 
     rows: list[tuple[Any, ...]] = []
+    frame = frame[[record.case.settings != OUTSIDE for record in frame.record]]
     frame = frame[["processor", "place", "title", "within", "side", "step_size", "record"]]
     for (processor, place), here in frame.groupby(["processor", "place"], sort=False):
         problem, within = here.title.iloc[0], here.within.iloc[0]

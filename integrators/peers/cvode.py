@@ -102,7 +102,7 @@ class Matrix(NamedTuple):
         """Return the matrix that fits the places of the entries: banded where few diagonals hold them all."""
         n, rows, columns = jacobian.shape[0], jacobian.rows, jacobian.columns
         below, above = int((rows - columns).max(initial=0)), int((columns - rows).max(initial=0))
-        if n > SMALL and 2 * below + above < n // 4:
+        if n > SMALL and below + above < n // 3:
             wide = below + above  # above the diagonal, with room for the pivots
             places = columns * (wide + below + 1) + rows - columns + wide
             return cls("Band", places, lambda lib, ctx: lib.SUNBandMatrix(n, above, below, ctx))

@@ -44,6 +44,21 @@ def test_a_ratio_is_that_of_the_fastest_settings_that_are_accurate_enough(race):
     assert table.rows[0][2:] == ("Gauss(s=8, h=1.5)", "2 ms", "15.0× (15.0–15.0)")
 
 
+def test_a_setting_outside_of_its_method_s_domain_takes_no_part(race):
+    there = race.copy()
+    there["record"] = [
+        msgspec.structs.replace(
+            record, case=msgspec.structs.replace(record.case, settings=cost_ratio.OUTSIDE)
+        )
+        if record.case.method.startswith("WHFast")
+        else record
+        for record in race.record
+    ]
+    assert set(texts(cost_ratio.ratios(there, "position error"))) == set(
+        texts(cost_ratio.ratios(race, "position error"))
+    ) - {"WHFast"}
+
+
 def test_levels_go_from_loose_to_tight_and_a_family_alone_is_told(race):
     found = cost_ratio.ratios(race, "position error")
     taylor = found[found.family == "Taylor"]
