@@ -53,19 +53,22 @@ class Chains:
     """
 
     def __init__(self, builder: Any, count: int, start: Any):
-        self._builder = builder
+        self._builder, self._count = builder, count
         self._chains: list[Any] = [start] + [None] * (3 if count >= 16 else 1)
-        self._next = 0
 
-    def add(self, column: Any, factor: Any) -> None:
-        """Add the next product."""
-        chain = self._chains[self._next]
-        self._chains[self._next] = (
+    def in_order(self) -> list[int]:
+        """Return the numbers of the products, chain by chain: few sums are in registers then."""
+        chains = len(self._chains)
+        return [j for chain in range(chains) for j in range(chain, self._count, chains)]
+
+    def add(self, j: int, column: Any, factor: Any) -> None:
+        """Add product j."""
+        chain = self._chains[j % len(self._chains)]
+        self._chains[j % len(self._chains)] = (
             self._builder.fmul(column, factor)
             if chain is None
             else llvm_call(self._builder, "fma", column, factor, chain)
         )
-        self._next = (self._next + 1) % len(self._chains)
 
     def total(self) -> Any:
         """Return the sum, the chains added pairwise."""

@@ -116,8 +116,34 @@ def _combined(builder: Any, vectors: Any, base: Any, index: Any, count: int, sta
     for j in range(count):
         offset = builder.add(index, ir.Constant(INTEGER, j))
         factor = splat(builder, builder.load(element(builder, base, offset, 1, DOUBLE)), WIDTH)
-        chains.add(builder.extract_value(vectors, j), factor)
+        chains.add(j, builder.extract_value(vectors, j), factor)
     return chains.total()
+
+
+@intrinsic(prefer_literal=True)
+def combine_rows(typing, table, first, count, base, index, stride, starts):
+    """Return what `combine` makes of ``count`` (a literal) columns in memory, for several rows at once.
+
+    Row r has its factors at ``index + stride * r`` and its start in ``starts[r]``. Each column is loaded once
+    for all rows, chain by chain, so that few sums are in registers at a time.
+    """
+    if not isinstance(count, types.IntegerLiteral):
+        return None
+
+    def generate(context, builder, sig, args):
+        rows = range(starts.count)
+        sums = [Chains(builder, count.literal_value, builder.extract_value(args[6], r)) for r in rows]
+        places = [builder.add(args[4], builder.mul(args[5], ir.Constant(INTEGER, r))) for r in rows]
+        for j in sums[0].in_order():
+            offset = builder.add(args[1], ir.Constant(INTEGER, WIDTH * j))
+            column = builder.load(element(builder, args[0], offset, 1, vector(WIDTH)), align=ALIGNMENT)
+            for r in rows:
+                place = builder.add(places[r], ir.Constant(INTEGER, j))
+                factor = builder.load(element(builder, args[3], place, 1, DOUBLE))
+                sums[r].add(j, column, splat(builder, factor, WIDTH))
+        return context.make_tuple(builder, starts, [chains.total() for chains in sums])
+
+    return starts(DOUBLES, types.int64, count, DOUBLES, types.int64, types.int64, starts), generate
 
 
 FOLDS = [
