@@ -6,7 +6,7 @@ STAMP  := $(VENV)/.installed
 PIP     = $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
 # Where the results of each study lie; pages are composed of them.
-RESULTS := speed/race speed/automatic speed/work-precision conservation/endure conservation/drift encounters general \
+RESULTS := speed/race speed/automatic speed/work-precision speed/planets conservation/endure conservation/drift encounters general \
   general/constraints many/large many/ensemble paper/paper paper/sitnikov peers
 OWN := chaos random costs
 REPORTS ?= $(RESULTS)

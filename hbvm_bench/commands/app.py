@@ -155,6 +155,10 @@ def reference(
         Path | None, typer.Option("-o", "--out", help="File to write the computed reference to.")
     ] = None,
     until: Annotated[float | None, typer.Option(help="End time, where no reference is stored yet.")] = None,
+    agreement: Annotated[
+        float | None,
+        typer.Option(min=0.0, max=1.0, help="How far the two may differ, for long intervals; as 1e-10."),
+    ] = None,
 ) -> None:
     """Recompute the reference solution of a problem in two ways and compare it with the stored one."""
     import numpy as np
@@ -166,7 +170,7 @@ def reference(
         ensure_writable(out.parent)
     stored = solutions.find_file(loaded)
     at = None if stored is None else np.array([float.fromhex(time) for time in stored.t])
-    fresh = trusted.make(loaded, until, at)
+    fresh = trusted.make(loaded, until, at, agreement)
     for key, value in fresh.provenance.items():
         print(f"{key}: {value}")
     print(f"end state: {' '.join(fresh.y[-1])}")

@@ -3,7 +3,9 @@
 Up to `SMALL` unknowns: heyoka's Taylor method in 128-bit arithmetic, checked by
 Gauss collocation in double-double arithmetic (`integrators.extended.collocation`); they
 must agree to 1e-20. Above: the collocation, checked by the Taylor method in
-long double, to 1e-15. A chaotic problem has a reference as far as they agree.
+long double, to 1e-15. Where less is asked for, as over a long interval: the Taylor
+method in long double, checked by Gauss in doubles. A chaotic problem has a reference
+as far as they agree.
 """
 
 import platform
@@ -17,6 +19,7 @@ from numpy.typing import NDArray
 from hbvm_bench.reference import solutions
 from hbvm_bench.reference.condition import conditions
 from hbvm_bench.reference.solutions import ReferenceFile
+from integrators import Gauss, integrate
 from integrators.extended import collocation
 from problems.errors import InputError
 from problems.problem import Problem
@@ -30,6 +33,7 @@ ROWS = ((20, 50), (SMALL, 20), (100, 10))
 FEW_ROWS = 4  # of larger systems
 FEW_DIGITS = 21  # above SMALL unknowns
 LONG_DOUBLE_TOLERANCE = "1e-20"
+IN_DOUBLES = Gauss(s=8, tol=1e-14)  # the check where few digits are asked for
 _EXACT = Context(prec=36)
 
 
@@ -96,8 +100,18 @@ def _places(problem: Problem, count: int) -> NDArray[np.int64]:
     return np.append(np.arange(0, count, -(-count // rows)), count)
 
 
-def ask(problem: Problem, at: Array) -> Opinions:
-    """Compute a problem twice, at the given times."""
+def ask(problem: Problem, at: Array, agreement: float | None = None) -> Opinions:
+    """Compute a problem twice, at the given times; see `make` for ``agreement``."""
+    long_double = (
+        f"heyoka taylor_adaptive, fp_type=longdouble, tol={LONG_DOUBLE_TOLERANCE}, high_accuracy=True"
+    )
+    if agreement is not None:
+        states = solutions.taylor(problem, at, LONG_DOUBLE_TOLERANCE, "longdouble")
+        doubles = integrate(problem, IN_DOUBLES, times=at).y.tolist()
+        check = [[Decimal(x) for x in row] for row in doubles]
+        return Opinions(
+            at, states, long_double, f"{IN_DOUBLES!r} in doubles", _apart(problem, states, check), agreement
+        )
     values = collocation.integrate(problem, at)
     gauss = (
         f"Gauss collocation with {collocation.STAGES} stages, double-double arithmetic, "
@@ -109,11 +123,12 @@ def ask(problem: Problem, at: Array) -> Opinions:
         taylor = f"heyoka taylor_adaptive, fp_type=real128, tol={solutions.TOLERANCE}, high_accuracy=True"
         return Opinions(at, states, taylor, gauss, _apart(problem, states, collocated), 1e-20)
     other = solutions.taylor(problem, at, LONG_DOUBLE_TOLERANCE, "longdouble")
-    taylor = f"heyoka taylor_adaptive, fp_type=longdouble, tol={LONG_DOUBLE_TOLERANCE}, high_accuracy=True"
-    return Opinions(at, collocated, gauss, taylor, _apart(problem, collocated, other), 1e-15)
+    return Opinions(at, collocated, gauss, long_double, _apart(problem, collocated, other), 1e-15)
 
 
-def make(problem: Problem, until: float | None = None, at: Array | None = None) -> ReferenceFile:
+def make(
+    problem: Problem, until: float | None = None, at: Array | None = None, agreement: float | None = None
+) -> ReferenceFile:
     """Return a reference that two computations agree on; seconds to minutes.
 
     Parameters
@@ -124,6 +139,9 @@ def make(problem: Problem, until: float | None = None, at: Array | None = None) 
         How far; by default the end of the problem's span.
     at : ndarray, optional
         The times instead of the bench's own, as those of a stored reference.
+    agreement : float, optional
+        How far the two may differ, relative to the largest component, at least about 1e-12; for intervals on
+        which more digits take hours.
 
     Returns
     -------
@@ -135,7 +153,7 @@ def make(problem: Problem, until: float | None = None, at: Array | None = None) 
     problems.errors.InputError
         If they do not agree anywhere.
     """
-    opinions = ask(problem, times(problem, until) if at is None else at)
+    opinions = ask(problem, times(problem, until) if at is None else at, agreement)
     kept = opinions.agreed
     if kept < 2:
         raise InputError(
@@ -144,7 +162,8 @@ def make(problem: Problem, until: float | None = None, at: Array | None = None) 
         )
     horizon = "the whole interval" if opinions.times[kept - 1] == problem.t_end else "this horizon"
     states = np.array(opinions.states[:kept]).astype(float)
-    text = str if problem.system.dim <= SMALL else _few_digits
+    all_digits = problem.system.dim <= SMALL and agreement is None
+    text = str if all_digits else _few_digits
     return solutions.file_from(
         problem,
         opinions.times[:kept],
@@ -159,7 +178,7 @@ def make(problem: Problem, until: float | None = None, at: Array | None = None) 
             "heyoka": version("heyoka"),
             "python": platform.python_version(),
         },
-        conditions(problem, opinions.times[:kept], states) if problem.system.dim <= SMALL else None,
+        conditions(problem, opinions.times[:kept], states) if all_digits else None,
     )
 
 

@@ -37,6 +37,7 @@ from hbvm_bench.summaries import cost_ratio as comparing
 from hbvm_bench.summaries import fastest as choosing
 from hbvm_bench.summaries import goals, needs, outcomes
 from hbvm_bench.summaries import growth as growing
+from hbvm_bench.summaries import longer as extrapolating
 from hbvm_bench.summaries.points import family_of
 from hbvm_bench.summaries.rows import Task, columns, grouped_by, numbers, tasks
 from hbvm_bench.summaries.table import Table
@@ -103,6 +104,11 @@ def fastest(
 ) -> Table | None:
     """Return the fastest setting of each family at these errors, or at those that the problems ask for."""
     return choosing.fastest(results.frame, within, equal_settings=equal_settings)
+
+
+def longer(results: Results, *, end: float, unit: str) -> Table | None:
+    """Return what an interval of so many units of time would take, extrapolated from the longest one."""
+    return extrapolating.longer(results.frame, end, unit)
 
 
 def growth(results: Results) -> Table | None:

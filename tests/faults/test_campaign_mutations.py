@@ -30,6 +30,7 @@ SLOW = (
     "paper",
     "encounters",
     "large",
+    "planets",
 )
 FOLDERS = ("chaos", "random", "costs")
 """Studies of ours that are folders with code."""

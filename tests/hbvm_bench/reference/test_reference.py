@@ -4,7 +4,7 @@ import pytest
 
 import problems
 from hbvm_bench.campaign.own import Known
-from hbvm_bench.reference import solutions
+from hbvm_bench.reference import solutions, trusted
 from hbvm_bench.store.store import Store
 from integrators.extended import arithmetic
 from problems import targets
@@ -81,6 +81,17 @@ def test_of_several_references_the_one_that_has_the_end_time_is_found():
     assert solutions.find(short).t[-1] == 1500.0
     assert solutions.find(long).t[-1] == 6000.0
     assert solutions.find(problems.load("sitnikov", t_end=1.0)).t[-1] == 1500.0
+    assert solutions.find(problems.load("solar_system", t_end=1e4)).t[-1] == 1e4
+
+
+def test_over_a_long_interval_less_agreement_may_be_asked_for():
+    pytest.importorskip("heyoka")
+    problem = problems.load("kepler", e=0.6, t_end=6.0)
+    made = trusted.make(problem, agreement=1e-10)
+    assert "longdouble" in made.provenance["method"]
+    assert made.provenance["check"] == "Gauss(s=8, tol=1e-14) in doubles"
+    assert float(made.provenance["agreement"].split(" ")[0]) < 1e-14  # measured 3.8e-16
+    assert made.condition == []
 
 
 def test_a_run_does_not_know_the_reference_of_another_run(tmp_path):
