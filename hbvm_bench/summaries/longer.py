@@ -60,19 +60,11 @@ def longer(frame: Frame, end: float, unit: str) -> Table | None:
             )
     if not rows:
         return None
-    heads = (
-        "family",
-        *["processor"] * several,
-        "setting",
-        "a step",
-        measured,
-        "energy",
-        "position",
-        "grows as",
-    )
+    first = ("family", *["processor"] * several, "setting", "a step")
+    errors = ("energy", "position", "grows as")
     return Table(
         f"The time of {end:.0e} {unit}, if every step costs the same",
-        (*heads, f"{end:.0e} {unit}"),
+        (*first, f"{longest:,.0f} {unit}", *errors, f"{end:.0e} {unit}"),
         rows,
         ASSUMED,
         words=range(2 + several),
