@@ -111,8 +111,9 @@ def integrate(
     threads : int
         Number of threads that share each step of HBVM and Gauss, for large systems: the vector field is
         evaluated at eight stages by each (with sixteen stages, by two threads), and the other operations are
-        shared by components. The solution is bitwise the same with any number. Other methods, small systems
-        and right-hand sides in Python take one thread. For many trajectories use `integrate_many`.
+        shared by components. The solution is bitwise the same with any number. Refused where it saves no
+        time: other methods, small systems, right-hand sides in Python. For many trajectories use
+        `integrate_many`.
     progress : bool or callable, optional
         True: show a progress bar on a terminal. A function: it is called about ten times a second with an
         `integrators.Progress`.
