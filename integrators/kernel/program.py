@@ -21,6 +21,7 @@ from integrators.kernel.inside.functions import Action, EventFunction
 from integrators.kernel.inside.search import Sought
 from integrators.kernel.line.kept import Kept
 from integrators.kernel.native import binary, machine
+from integrators.kernel.native.field import compile_part
 from integrators.kernel.native.foreign import field_of
 from integrators.kernel.native.stages import ON_LANES
 from integrators.kernel.parts.implicit import ALWAYS_IMPLICIT
@@ -326,6 +327,12 @@ class HBVMProgram(Compiled):
     def field_of_eight(self) -> binary.Native:
         """Return the field on eight of the stages that lie side by side, compiled or loaded."""
         return field_of(self.system, self._quantity, 8, self.constants.lanes)
+
+    def part_of_field(self) -> binary.Native | None:
+        """Return what sets some rows of the field, compiled or loaded, if there is such a function."""
+        if not (self.system.traced and self.lanes):
+            return None
+        return compile_part(self.system, self._quantity, self.constants.lanes)
 
     def implicit(self) -> Workspace:
         """Return memory for the implicit solver; its code is compiled, or loaded, the first time."""

@@ -114,6 +114,7 @@ class Program(Protocol):
     def scaled(self, h: float) -> dict[str, Array]: ...
     def implicit(self) -> Workspace: ...
     def field_of_eight(self) -> binary.Native: ...
+    def part_of_field(self) -> binary.Native | None: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,7 +205,7 @@ class HBVMStepper(ABC):
             reason = f"eight stages of {system.name} are evaluated in one thread"
         else:
             contexts = self._context, self._partial
-            self._threads = Threads(threads, contexts, program.field_of_eight())
+            self._threads = Threads(threads, contexts, program.field_of_eight(), program.part_of_field())
             program.compile_seconds += binary.clock() - started
             return
         raise InputError(f"threads={threads} saves no time: {reason}; leave it out.")

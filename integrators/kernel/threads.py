@@ -24,12 +24,18 @@ class Threads:
         Memory of the trajectory, and of its partial steps.
     field : Native
         The field, on eight stages of those that lie side by side.
+    part : Native or None
+        What sets some of its rows, if there is such a function.
     """
 
-    def __init__(self, count: int, contexts: tuple[Context, Context], field: binary.Native):
+    def __init__(
+        self, count: int, contexts: tuple[Context, Context], field: binary.Native, part: binary.Native | None
+    ):
         shape = contexts[0].shape
         pieces = max(-(-shape.rows // BLOCK), -(-shape.constants.k // 8))
-        self._team = Team({"most": pieces}, {}, {"code": work.code(), "rest": _Rest(), "field": field})
+        self._team = Team(
+            {"most": pieces}, {}, {"code": work.code(), "rest": _Rest(), "field": field, "part": part}
+        )
         for context in contexts:
             context.team = self._team
         self._helpers, self._pool = count - 1, ThreadPoolExecutor(count - 1)

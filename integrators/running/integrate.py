@@ -109,9 +109,9 @@ def integrate(
         The initial state with more digits than doubles have, for ``Gauss(..., precision="double-double")``:
         numbers of mpmath, or pairs of doubles. Rounded to doubles it must be that of the problem.
     threads : int
-        Number of threads that share each step of HBVM and Gauss, for large systems: the vector field is
-        evaluated at eight stages by each (with sixteen stages, by two threads), and the other operations are
-        shared by components. The solution is bitwise the same with any number. Refused where it saves no
+        Number of threads that share each step of HBVM and Gauss, for large systems: by components where the
+        vector field is a loop over neighbours, else it is evaluated at eight stages by each (with sixteen
+        stages, by two threads). The solution is bitwise the same with any number. Refused where it saves no
         time: other methods, small systems, right-hand sides in Python. For many trajectories use
         `integrate_many`.
     progress : bool or callable, optional

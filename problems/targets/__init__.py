@@ -29,7 +29,7 @@ from problems.systems.opaque import Opaque
 from problems.targets import cache
 from problems.targets.array_text import jax_text, numpy_text
 from problems.targets.heyoka_text import heyoka_text
-from problems.targets.numba_text import numba_text
+from problems.targets.numba_text import numba_text, numba_text_of_part
 from problems.targets.plan import SMALL, make_plan, unrolled
 
 _WRITERS = {"numpy": numpy_text, "numba": numba_text, "jax": jax_text, "heyoka": heyoka_text}
@@ -187,6 +187,21 @@ def numba_of(function: Function, name: str) -> tuple[str, Callable[..., Any]]:
 
     namespace: dict[str, Any] = {"np": np, **vars(called), **_MATHEMATICS}
     return emitted.text, _executed(emitted, namespace)
+
+
+def numba_of_part(system: System, quantity: Quantity) -> tuple[str, Callable[..., Any]] | None:
+    """Return the source of ``f(t, y, par, out, first, last)``, and it as a function that numba can compile.
+
+    It sets some of the outputs: the same numbers as all. ``None`` if the function is no loop over neighbours.
+    """
+    function = _function(system, quantity)
+    text = numba_text_of_part(make_plan(function, limit=SMALL), "part")
+    if text is None:
+        return None
+    from problems.targets import called  # which loads numba
+
+    namespace: dict[str, Any] = {"np": np, **vars(called), **_MATHEMATICS}
+    return text, _executed(Source(text, "part", "", 0), namespace)
 
 
 def _opaque_on_arrays(system: Opaque, t: Any, y: Any, par: Any) -> np.ndarray:

@@ -7,8 +7,10 @@ import numpy as np
 from problems.graph.functions import CALLED
 from problems.graph.nodes import READS, Loop, Node
 from problems.targets.loops import Nest, Range, Table, nest, ranges
-from problems.targets.plan import Fill, Plan, Scatter
+from problems.targets.plan import Fill, Plan, Reduce, Scatter
 from problems.targets.printer import Places, Printer, variable
+
+MOST_ALONE = 200  # statements outside of loops, which are repeated for every part
 
 _FUNCTIONS = {name: f.numba for name, f in CALLED.items()}
 
@@ -214,6 +216,76 @@ def _runs(places: list[int]) -> list[range]:
         else:
             runs.append(range(place, place + 1))
     return runs
+
+
+class _PartPrinter(_NumbaPrinter):
+    """Prints what sets the outputs from ``first`` to ``last`` only: the same sums in the same order."""
+
+    def store(self, place: int, value: str) -> None:
+        self.line(f"if first <= {place} < last:")
+        self.line(f"    out[{place}] = {value}")
+
+    def _loops(self, zeros: list[int], scatters: Sequence[Scatter]) -> None:
+        for places in _runs(zeros):
+            self.line(f"for k in range(max({places.start}, first), min({places.stop}, last)):")
+            self.line("    out[k] = -0.0")
+        for scatter in scatters:
+            for piece in ranges(scatter.loop) or ():
+                self._part(piece, scatter)
+
+    def _part(self, piece: Range, scatter: Scatter) -> None:
+        """Print the terms of a range that add to these outputs, those that add to others too apart."""
+        if piece.n == 1:
+            self._guarded(piece, scatter)
+            return
+        shifts = [piece.along(entry.index).offset for entry in scatter.entries]
+        low, high = min(shifts), max(shifts)
+        self.line(f"begin = min(max(0, first - {high}), {piece.n})")
+        self.line(f"end = max(begin, min({piece.n}, last - {low}))")
+        self.line(f"inner = min(max(begin, first - {low}), end)")
+        self.line(f"outer = max(inner, min(end, last - {high}))")
+        outside = self.indent
+        for start, stop in (("begin", "inner"), ("inner", "outer"), ("outer", "end")):
+            self.line(f"for k in range({start}, {stop}):")
+            self.indent = outside + "    "
+            if start == "inner":
+                for node in scatter.body:
+                    self.let(node, piece.index)
+                self._add_to(scatter, piece, {}, {})
+            else:
+                self._guarded(piece, scatter)
+            self.indent = outside
+
+    def _guarded(self, piece: Range, scatter: Scatter) -> None:
+        """Print one term; of the outputs it adds to those in the part."""
+        for node in scatter.body:
+            self.let(node, piece.index)
+        outside = self.indent
+        for i, entry in enumerate(scatter.entries):
+            self.line(f"if first <= {piece.index(entry.index)} < last:")
+            self.indent = outside + "    "
+            self._add_to(Scatter(scatter.loop, (), (entry,), (scatter.unique[i],)), piece, {}, {})
+            self.indent = outside
+
+
+def numba_text_of_part(plan: Plan, name: str) -> str | None:
+    """Return ``def name(t, y, par, out, first, last)``, which sets some of the outputs.
+
+    ``None`` where a part costs as much as all, or where loops are not over one output after another.
+    """
+    alone = plan.first + plan.last
+    if not plan.scatters or len(alone) > MOST_ALONE or any(isinstance(one, Fill | Reduce) for one in alone):
+        return None
+    for scatter in plan.scatters:
+        pieces = None if nest(scatter.loop) is not None else ranges(scatter.loop)
+        if pieces is None:
+            return None
+        for piece in pieces:
+            if piece.n > 1 and any(piece.along(e.index).coefficients != (1,) for e in scatter.entries):
+                return None
+    printer = _PartPrinter(plan, _FUNCTIONS)
+    printer.write()
+    return printer.finished(f"{name}(t, y, par, out, first, last)")
 
 
 def numba_text(plan: Plan, name: str) -> str:

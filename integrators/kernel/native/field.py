@@ -37,3 +37,16 @@ def compile_field(
     source = targets.source(system, quantity, "numba")
     name = store.key("field", source.text, f"{lanes} {stride or lanes}", binary.sources(BUILT_BY))
     return binary.obtain(name, lambda: stages.build(targets.numba(system, quantity).py_func, lanes, stride))
+
+
+def compile_part(system: System, quantity: targets.Quantity, lanes: int) -> binary.Native | None:
+    """Compile what sets a part of the rows, ``void(t, stages, par, values, first, last)``; ``None``: none is.
+
+    All ``lanes`` stages lie side by side.
+    """
+    made = targets.numba_of_part(system, quantity)
+    if made is None:
+        return None
+    text, function = made
+    name = store.key("part", text, str(lanes), binary.sources(BUILT_BY))
+    return binary.obtain(name, lambda: (stages.ON_LANES, stages.build_part(function, lanes)))

@@ -31,6 +31,14 @@ def build_on_lanes(function: Any, lanes: int, stride: int | None = None) -> byte
     return binary.build(*on_lanes(function, lanes, stride))
 
 
+def build_part(function: Any, lanes: int) -> bytes:
+    """Compile ``function(t, y, par, out, first, last)`` with t and y[i] as lanes, and two integers."""
+    from numba import types
+
+    compiled, arguments = on_lanes(function, lanes)
+    return binary.build(compiled, [*arguments, (types.int64, "i64"), (types.int64, "i64")])
+
+
 def build_one_by_one(function: Any, lanes: int, stride: int | None = None) -> bytes:
     """Compile a loop over stages that calls ``function`` with scalars."""
     return binary.build(*_one_by_one(function, lanes, stride))

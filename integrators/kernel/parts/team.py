@@ -25,6 +25,7 @@ class Team(Memory):
     code = Pointer()  # of `step.work.work`
     rest = Pointer()  # what lets another thread have the processor, int(); see `threads`
     field = Pointer()  # the field on eight stages of those that lie side by side
+    part = Pointer()  # what sets some of its rows, void(times, stages, par, values, first, last); 0: none
     context = Integer()  # address of the trajectory's memory, or of that for its partial steps
     job = Integer()
     table = Array()  # of a product

@@ -263,10 +263,13 @@ def _caller(arguments: int, returns: Any = types.void) -> Any:
     def four(typing, function, a, b, c, d):
         return returns(types.int64, a, b, c, d), generate
 
+    def six(typing, function, a, b, c, d, e, f):
+        return returns(types.int64, a, b, c, d, e, f), generate
+
     def eleven(typing, function, a, b, c, d, e, f, g, h, i, j, k):
         return returns(types.int64, a, b, c, d, e, f, g, h, i, j, k), generate
 
-    return intrinsic({0: none, 2: two, 3: three, 4: four, 11: eleven}[arguments])
+    return intrinsic({0: none, 2: two, 3: three, 4: four, 6: six, 11: eleven}[arguments])
 
 
 call_field = _caller(4)
@@ -275,6 +278,8 @@ call_iterations = _caller(3)
 """``call_iterations(fused, ctx, count, after)``: see `integrators.kernel.step.fused`."""
 call_solver = _caller(3, types.int64)
 """``call_solver(solver, ctx, memory, started)``: the implicit solver."""
+call_part = _caller(6)
+"""``call_part(part, times, stages, par, values, first, last)``: some rows of the field."""
 call_nothing = _caller(0)
 """``call_nothing(function)``: a function without arguments."""
 call_work = _caller(2, types.int64)

@@ -24,7 +24,9 @@ def share(ctx, job, table):
     team = team_at(ctx.team)
     pieces, first = team.pieces, observe(team.pieces, NEXT)
     team.context, team.job, team.table, team.first = address_of(ctx), job, table, first
-    count = ctx.calls * (ctx.lanes >> 3) if job == FIELD else (ctx.rows + BLOCK - 1) // BLOCK
+    count = (ctx.rows + BLOCK - 1) // BLOCK
+    if job == FIELD and team.part == 0:
+        count = ctx.calls * (ctx.lanes >> 3)
     increase(pieces, OPENED, count)
     call_work(team.code, team, 0)
     looks = 0

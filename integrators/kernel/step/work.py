@@ -19,7 +19,7 @@ from integrators.kernel.parts.team import (
     PRODUCT_OF_TWO,
 )
 from integrators.kernel.simd.atomic import claim, increase, observe
-from integrators.kernel.simd.memory import call_field, put
+from integrators.kernel.simd.memory import call_field, call_part, put
 from integrators.kernel.step.begin import prepare_rows
 from integrators.kernel.step.coefficients import take_coefficients_of_rows
 from integrators.kernel.step.finish import finish_rows
@@ -51,13 +51,17 @@ def next_piece(pieces):
 def do(ctx, team, piece):
     """Do a piece of the job."""
     job, table = team.job, team.table
-    if job == FIELD:
+    if job == FIELD and team.part == 0:
         start = offset(ctx, piece)
         call_field(team.field, ctx.times + 8 * piece, ctx.stages + start, ctx.par, ctx.values + start)
         return
     first = BLOCK * piece
     last = min(first + BLOCK, ctx.rows)
-    if job == PRODUCT:
+    if job == FIELD:
+        for call in range(ctx.calls):
+            times, shift = ctx.times + ctx.lanes * call, ctx.lanes * ctx.padded * call
+            call_part(team.part, times, ctx.stages + shift, ctx.par, ctx.values + shift, first, last)
+    elif job == PRODUCT:
         product_of_rows(ctx, table, first, last)
     elif job == PRODUCT_AND_CHANGE:
         put(team.results, 8 * piece, product_and_change_of_rows(ctx, table, first, last))

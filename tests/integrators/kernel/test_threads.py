@@ -15,6 +15,29 @@ WAVE = problems.load("sine_gordon", n=SITES)
 BODIES = problems.load("cluster", n=100)
 
 
+def hops(n):
+    """Return a chain with three ranges of springs: an output has summands of several loops."""
+
+    def energy(q, p, m):
+        kinetic = m.sum(lambda i: p[i] ** 2 / 2, range(n))
+        near = m.sum(lambda i: 1.0 - m.cos(q[i + 1] - q[i]), range(n - 1))
+        far = m.sum(lambda i: (q[i + 3] - q[i]) ** 4 / 4, range(n - 3))
+        return kinetic + near + far + m.sum(lambda i: (q[i] - q[i + 100]) ** 2 / 9, range(n - 100))
+
+    p0 = np.cos(np.arange(n) ** 2)
+    return problems.Problem(problems.Hamiltonian(energy, dof=n), q0=np.zeros(n), p0=p0, t_end=1.0)
+
+
+def rotors(n):
+    """Return rotors in a row, driven; first-order form."""
+
+    def f(t, y, m):
+        inner = m.each(lambda i: m.sin(y[i - 1] - y[i]) + m.sin(y[i + 1] - y[i]) + m.cos(t), range(1, n - 1))
+        return [y[1] - y[0], *inner, y[n - 2] - y[n - 1]]
+
+    return problems.Problem(problems.VectorField(f, dim=n), y0=np.sin(np.arange(n) ** 2), t_end=1.0)
+
+
 def numba_ring(n):
     """Return coupled rotors with a right-hand side that numba compiles; first-order form."""
 
@@ -43,6 +66,9 @@ def cores(monkeypatch):
         (CHAIN, HBVM(k=24, s=20, h=0.25), 1.0),
         (CHAIN, HBVM(), 2.0),
         (WAVE, HBVM(k=8, s=4, h=0.02), 0.1),
+        (hops(600), HBVM(k=16, s=8, h=0.1), 0.5),
+        (rotors(600), HBVM(), 0.5),
+        (rotors(600), Gauss(s=8, h=0.1), 0.5),
         (BODIES, Gauss(s=12, h=1e-3), 0.01),
         (BODIES, HBVM(), 0.01),
         (numba_ring(20), Gauss(s=16, h=0.1), 0.5),
