@@ -37,7 +37,7 @@ class Group(Memory):
     # --- where the trajectories are ---
     t0 = Table("lanes")
     time_low = Table("lanes")  # what `t0` lacks
-    n = Integer()  # steps since `t0`
+    n = Integer()  # steps since `t0`, or of adaptive ones since the group was last looked after
     state = Table("dim", "lanes")  # q, p or y
     error = Table("dim", "lanes")  # what `state` lacks
     alive = Table("lanes")  # 1: goes on; 0: left, because its equations were not solved

@@ -279,11 +279,12 @@ def run(first, budget):
             return 1
         if budget <= 0 or not (group.events == 0 or has_room(group)):
             return 0
-        budget -= 1
         group.n = 0
         if group.events:
             keep_start(group)
-        call_steps(group.code, group, 1)
+        # They go on by themselves while there is nothing to be looked after in any lane.
+        call_steps(group.code, group, 1 if group.events else budget)
+        budget -= group.n
         for lane in range(lanes):
             if group.member[lane] < 0:
                 continue

@@ -177,7 +177,7 @@ def steps(lanes: int, few: int) -> Any:
                 for i in range(k):
                     base[rows * i + d] = lacks
         t0, low = part(group.t0, first)[0], part(group.time_low, first)[0]
-        return time_of_step(t0, low, float(group.n), h)
+        return time_of_step(t0, low, 0.0 if varying else float(group.n), h)
 
     @compiled
     def at(form, x, powers, d):
@@ -408,7 +408,9 @@ def steps(lanes: int, few: int) -> Any:
                 # A lane is not judged any more once it is known how many iterations are left. Where that is
                 # known of all, the end of the iteration need not wait for the rule.
                 undecided = active & (left >= INFINITY)
-                if somewhere(undecided):
+                if tried == 1:  # one change tells no rate
+                    last = best = largest_change(form, moved, block_weights, zero)
+                elif somewhere(undecided):
                     # What is judged is the change that the next iteration would make of the stages, beside
                     # their block: bounded by that of the values.
                     change = largest_change(form, moved, block_weights, zero)
@@ -452,6 +454,10 @@ def steps(lanes: int, few: int) -> Any:
             group.n += 1
             if not somewhere(alive & (everywhere(float(count - taken), h) > 0.0)):
                 break
+            if varying:
+                if somewhere(opposite(as_rows(group.ordinary, lanes)[0] > 0.0)):
+                    break
+                h = as_rows(group.h, lanes)[0]
         if held:
             for i in range(of_stages):
                 values[i] = kept[i]
