@@ -111,3 +111,15 @@ def test_a_step_that_fails_fails_with_threads_too():
 def test_threads_that_save_no_time_are_refused(problem, method, threads, sentence):
     with pytest.raises(InputError, match=sentence):
         integrate(problem, method, threads=threads)
+
+
+def test_ctrl_c_ends_an_integration_that_threads_share():
+    def interrupt(progress):
+        if progress.steps:
+            raise KeyboardInterrupt
+
+    method, times = HBVM(k=8, s=4, h=0.25), np.linspace(0.0, 1e5, 100_001)
+    solution = integrate(CHAIN, method, times, threads=2, progress=interrupt)
+    assert solution.status == "interrupted"
+    assert 0.0 < solution.t_stop < 1e5
+    assert np.array_equal(solution.y[:1], integrate(CHAIN, method, solution.t[:1]).y)
