@@ -153,11 +153,14 @@ class Solve:
         controller state, dt, accepted, rejected, code)``.
     make_plain : callable
         Compiles `plain`.
+    many : callable
+        `plain` of many starts and parameters at once, by ``jax.vmap`` under ``jax.jit``.
     """
 
     begin: Compiled
     run: Compiled
     make_plain: Callable[[], Compiled]
+    many: Callable[..., Any]
     seconds: float = field(init=False)
 
     @cached_property
@@ -209,6 +212,11 @@ def _compile_plain(function: Callable[..., Any], *arguments: Any) -> Compiled:
     call = jax.jit(function, in_shardings=jax.sharding.SingleDeviceSharding(cpu()))
     jax.block_until_ready(call(*arguments))
     return Compiled(call, perf_counter() - started)
+
+
+def _many(plain: Callable[..., Any], axes: tuple[int | None, ...]) -> Callable[..., Any]:
+    """Return a plain solve of many trajectories at once, which compiles for each number of them."""
+    return jax.jit(jax.vmap(plain, in_axes=axes), in_shardings=jax.sharding.SingleDeviceSharding(cpu()))
 
 
 def _apart(f: Callable[..., Any]) -> Callable[..., Any]:
@@ -292,7 +300,8 @@ def _fixed(terms: Any, solver: Any, dim: int, n_par: int, split: bool) -> Solve:
     unity = np.float64(1.0)
     first = _compile(begin, tau, y, par)
     last = _compile(run, tau, unity, n, n, y, first.call(tau, y, par), par)
-    return Solve(first, last, lambda: _compile_plain(plain, tau, tau, unity, y, par))
+    many = _many(plain, (None, None, None, 0, 0))
+    return Solve(first, last, lambda: _compile_plain(plain, tau, tau, unity, y, par), many)
 
 
 def _plainly(
@@ -374,4 +383,5 @@ def _adaptive(terms: Any, solver: Any, dim: int, n_par: int, split: bool) -> Sol
     first = _compile(begin, unity, y, par, unity, unity)
     state, control, dt = first.call(unity, y, par, unity, unity)
     last = _compile(run, unity, unity, dt, y, state, control, np.int64(1), par, unity, unity)
-    return Solve(first, last, lambda: _compile_plain(plain, unity, unity, y, par, unity, unity))
+    many = _many(plain, (None, None, 0, 0, None, None))
+    return Solve(first, last, lambda: _compile_plain(plain, unity, unity, y, par, unity, unity), many)

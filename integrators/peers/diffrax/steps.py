@@ -1,12 +1,16 @@
 """Programs and trajectories of diffrax's solvers."""
 
 import math
+from collections.abc import Callable
+from time import perf_counter
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from integrators.peers import load
-from integrators.protocol import Array, MethodBase, Status
+from integrators.protocol import Array, MethodBase, Status, Trajectories
+from integrators.refusals import check_batch, check_times
 from integrators.running.watchdog import STALL_STEPS, StallDetector, stall_detector
 from integrators.stepping import FixedStepper, ProgramBase, RestorableStepper, StepperBase
 from problems.errors import InputError
@@ -39,6 +43,54 @@ class DiffraxProgram(ProgramBase):
     def stepper(self, y: Array, par: Array, t: float) -> StepperBase:
         """Return a trajectory."""
         return (AdaptiveStepper if self.adaptive else DiffraxStepper)(self, y, par, t)
+
+    def batch(
+        self, Y0: ArrayLike, par: ArrayLike | None = None, *, times: ArrayLike, t0: float = 0.0
+    ) -> Trajectories:
+        """Integrate many initial conditions to the same times under ``jax.vmap``; see `prepare_batch`."""
+        return self.prepare_batch(Y0, par, times=times, t0=t0)()
+
+    def prepare_batch(
+        self, Y0: ArrayLike, par: ArrayLike | None = None, *, times: ArrayLike, t0: float = 0.0
+    ) -> Callable[[], Trajectories]:
+        """Compile ``jax.jit(jax.vmap(solve))`` for so many trajectories; return what integrates them, once.
+
+        Each has step sizes of its own, and all wait for the one with the most steps. Every time is the end of
+        a plain ``diffeqsolve``, after which the next one begins.
+        """
+        grid = check_times(times, t0)
+        starts, parameters = check_batch(Y0, par, grid, self.system)
+        sign = 1 if grid[-1] > t0 else -1
+        many = self.solve_for(sign)[0].many
+        method = self.method
+
+        def solved(t: float, end: float, y: Array) -> tuple[Array, Array]:
+            span = np.float64(sign * t), np.float64(sign * end)
+            if self.adaptive:
+                y, counts = many(*span, y, parameters, np.float64(method.rtol), np.float64(method.atol))
+            else:
+                y, counts = many(*span, np.float64(method.h), y, parameters)
+            return np.asarray(y), np.asarray(counts)
+
+        begun = perf_counter()
+        solved(t0, t0, starts)
+        self.compile_seconds += perf_counter() - begun
+        return lambda: self._batch(solved, starts, grid, t0)
+
+    def _batch(self, solved: Callable[..., Any], y: Array, grid: Array, t0: float) -> Trajectories:
+        n, t = len(y), t0
+        states, steps = np.empty((n, grid.size, y.shape[1])), np.zeros(n, dtype=np.int64)
+        status, reason, stopped = [Status.FINISHED] * n, [""] * n, np.full(n, grid[-1])
+        for place, end in enumerate(grid.tolist()):
+            y, counts = solved(t, end, y)
+            y = np.where(counts[:, 2:] > 0, y, np.nan)
+            steps += np.where(np.isfinite(y[:, 0]), counts[:, 0], 0)
+            for i in np.flatnonzero(~np.isfinite(y).all(axis=1)).tolist():
+                if status[i] is Status.FINISHED:
+                    status[i], stopped[i] = Status.NOT_FINITE, t
+                    reason[i] = f"diffrax did not get from t = {t!r} to {end!r}."
+            states[:, place], t = y, end
+        return Trajectories(t=grid, y=states, status=status, reason=reason, t_stop=stopped, steps=steps)
 
 
 class _Direction:
