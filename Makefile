@@ -32,7 +32,7 @@ reports: venv  ## write the results REPORTS="speed/race paper/sitnikov" from run
 
 evidence: venv  ## every study and its page, with one version of the code on a quiet machine; goes on where it was stopped
 	$(BIN)/hbvm-bench doctor
-	$(BIN)/python -c "from integrators.kernel import ahead; ahead.lower()"  # as a wheel has it: compilations are a wheel's
+	$(BIN)/python -c "from integrators.kernel import ahead; ahead.ship()"  # as a wheel has it: compilations are a wheel's
 	$(MAKE) reports
 
 pages: venv  ## draw every page and the list of reports from the results that lie there; nothing is run
