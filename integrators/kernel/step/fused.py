@@ -5,7 +5,7 @@ values are stored and loaded by the product. Compiled together, one after anothe
 and values in registers, as far as there are enough: the sums of three rows of sixteen stages would take 48
 registers of AVX2, which has 16, and are made one after another. There a product waits for its loads, and
 two rows at a time need two thirds of them, since each column is loaded once for both (an iteration of 16
-stages takes 8 to 16 % less on Zen 5 restricted to AVX2). The operations and the order of each sum are those
+stages takes 6 to 16 % less on Zen 5 restricted to AVX2). The operations and the order of each sum are those
 of `fixed_point.evaluate`, `fixed_point.product8` and `fixed_point.product16`, hence the bits are
 (``tests/integrators/kernel/step/test_fused.py``).
 """

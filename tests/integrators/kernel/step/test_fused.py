@@ -19,6 +19,7 @@ CASES = [
     ("period_annulus", {"k": 8, "s": 3, "h": 0.5}),
     ("pendulum", {"k": 16, "s": 8, "h": 0.5}),
     ("double_pendulum", {"k": 16, "s": 12, "h": 0.3}),
+    ("rigid_body", {"k": 16, "s": 12, "h": 0.3}),  # an odd number of rows
 ]
 
 
