@@ -139,17 +139,10 @@ def steps(lanes: int, few: int) -> Any:
     def measure_vectors(form, group, factor, values, sizes, block_weights, floored_weights):
         for first in range(0, lanes, few):
             measure_along(
-                form,
-                form.vectors,
-                group,
-                first,
-                part(group.h, first)[0],
-                rows_from(factor, first),
-                rows_from(values, first),
-                rows_from(sizes, first),
-                rows_from(block_weights, first),
-                rows_from(floored_weights, first),
-            )
+                form, form.vectors, group, first, part(group.h, first)[0], rows_from(factor, first),
+                rows_from(values, first), rows_from(sizes, first),
+                rows_from(block_weights, first), rows_from(floored_weights, first),
+            )  # fmt: skip
 
     @compiled
     def begin(form, group, first, h, factor):
@@ -222,17 +215,9 @@ def steps(lanes: int, few: int) -> Any:
             times = rows_from(time, first)
             times[0], times[1] = begin(form, group, first, h, factors)
             measure(
-                form,
-                form.blocks,
-                group,
-                first,
-                h,
-                factors,
-                own,
-                rows_from(sizes, first),
-                rows_from(block_weights, first),
-                rows_from(floored_weights, first),
-            )
+                form, form.blocks, group, first, h, factors, own, rows_from(sizes, first),
+                rows_from(block_weights, first), rows_from(floored_weights, first),
+            )  # fmt: skip
             predict(form, group, first, own, rows_from(ahead, first))
 
     @compiled
@@ -335,18 +320,10 @@ def steps(lanes: int, few: int) -> Any:
             part(group.alive, first)[0] = where(alive, 1.0, 0.0)
             if form.varying:
                 end_varying_step(
-                    form,
-                    group,
-                    first,
-                    own,
-                    h,
-                    alive,
-                    scratch,
-                    rows_from(sizes, first),
-                    rows_from(moved, first),
-                    rows_from(block_weights, first),
-                    rows_from(floored_weights, first),
-                )
+                    form, group, first, own, h, alive, scratch,
+                    rows_from(sizes, first), rows_from(moved, first),
+                    rows_from(block_weights, first), rows_from(floored_weights, first),
+                )  # fmt: skip
 
     @compiled
     def run(field, constants, address, count):
@@ -385,21 +362,9 @@ def steps(lanes: int, few: int) -> Any:
             tried = 0
             while True:
                 iteration(
-                    field,
-                    form,
-                    group,
-                    t,
-                    t_low,
-                    h,
-                    active,
-                    factor,
-                    kept,
-                    moved,
-                    stage,
-                    field_values,
-                    newest,
+                    field, form, group, t, t_low, h, active, factor, kept, moved, stage, field_values, newest,
                     time,
-                )
+                )  # fmt: skip
                 if form.vectors.groups:
                     measure_vectors(form, group, factor, kept, sizes, block_weights, floored_weights)
                 tried += 1
