@@ -16,6 +16,7 @@ from integrators.kernel.engines import (
     run_own,
     solver,
     steps,
+    work,
 )
 from integrators.kernel.native import shipped
 from integrators.kernel.routes import FEW_ROWS
@@ -30,6 +31,7 @@ ENGINES = {
     "variations": follow,
     "exponents": orthonormal,
     "recorded steps": record,
+    "threads": work,
     "adjoints": pull,
 }
 
