@@ -13,7 +13,6 @@ from integrators.protocol import Array, Status, Trajectories
 from integrators.refusals import check_batch, check_times
 from integrators.running.times import Counts
 from integrators.running.watchdog import STALL_STEPS, StallDetector
-from problems import targets
 from problems.systems.base import System
 
 
@@ -24,17 +23,19 @@ class Lanes:
     ----------
     system : System
         What moves.
+    equations : list
+        heyoka's pairs of variable and right-hand side.
     options : dict
         Those of `integrators.peers.heyoka.taylor.Taylor`.
     """
 
-    def __init__(self, system: System, options: dict[str, Any]):
+    def __init__(self, system: System, equations: list[Any], options: dict[str, Any]):
         hy = load("heyoka")
         self.system = system
         self.size = int(hy.recommended_simd_size())
         started = perf_counter()
         self._ta = hy.taylor_adaptive_batch(
-            targets.heyoka(system),
+            equations,
             np.zeros((system.dim, self.size)),
             **options,
         )

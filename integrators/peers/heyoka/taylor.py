@@ -150,7 +150,7 @@ class TaylorProgram(ProgramBase):
             after = hy.llvm_state.get_memcache_size(), hy.llvm_state.get_diskcache_size()
         self.from_cache = use and (after[0] == before[0] or after[1] == before[1])
         self.compile_seconds = perf_counter() - started
-        self._lanes: Lanes | None = None
+        self._lanes: dict[bytes, Lanes] = {}  # by what of the parameters is compiled in
         # Copying takes a millisecond, and a copy's code is not in the processor's caches yet: the first
         # tenth of a millisecond would be slower than the library is.
         self._spare: dict[bytes, list[Any]] = {}
@@ -230,13 +230,27 @@ class TaylorProgram(ProgramBase):
     def prepare_batch(
         self, Y0: ArrayLike, par: ArrayLike | None = None, *, times: ArrayLike, t0: float = 0.0
     ) -> Callable[[], Trajectories]:
-        """Compile, check and allocate all that `batch` needs; return what then does it, once."""
-        if self._nbody:
-            raise InputError("nbody=True has no ensembles, since the masses are compiled in; leave it out.")
-        if self._lanes is None:
-            self._lanes = Lanes(self.system, self._options)
-            self.compile_seconds += self._lanes.compile_seconds
-        return self._lanes.prepare(Y0, par, times, t0)
+        """Compile, check and allocate all that `batch` needs; return what then does it, once.
+
+        Raises
+        ------
+        problems.errors.InputError
+            With ``nbody``, for trajectories with different parameters, since masses are compiled in.
+        """
+        first = self.system.pack()
+        if self._nbody and par is not None:
+            rows = np.atleast_2d(np.asarray(par, dtype=np.float64))
+            first = rows[0]
+            if (rows != first).any():
+                raise InputError("nbody=True needs the same parameters in all trajectories; leave it out.")
+        key = self._compiled_in(first)
+        if key not in self._lanes:
+            if self._nbody:
+                self._check_bodies(first)
+                check_gravity(self.system, first, t0, np.atleast_2d(np.asarray(Y0, dtype=np.float64))[0])
+            self._lanes[key] = Lanes(self.system, self._equations(first), self._options)
+            self.compile_seconds += self._lanes[key].compile_seconds
+        return self._lanes[key].prepare(Y0, par, times, t0)
 
     def stepper(self, y: Array, par: Array, t: float) -> "TaylorStepper":
         """Return a trajectory.

@@ -244,5 +244,16 @@ def test_its_own_model_is_for_bodies_alone() -> None:
         integrate(problems.load("kepler", t_end=1.0), Taylor(nbody=True))
     problem = problems.load("outer_solar_system", t_end=1.0)
     program = Taylor(compact_mode=True, nbody=True).compile(problem.system)
-    with pytest.raises(InputError, match=r"nbody=True has no ensembles"):
-        program.batch([problem.y0], times=[1.0])
+    heavier = problem.par * np.array([[1.0], [1.01]])
+    with pytest.raises(InputError, match=r"nbody=True needs the same parameters in all trajectories"):
+        program.batch([problem.y0, problem.y0], heavier, times=[1.0])
+
+
+def test_many_clusters_of_its_own_model_are_those_of_one_after_the_other() -> None:
+    problem = problems.load("outer_solar_system", t_end=100.0)
+    program = Taylor(compact_mode=True, nbody=True).compile(problem.system)
+    starts = np.outer([1.0, 1.0001, 0.9999], problem.y0)
+    made = program.batch(starts, np.tile(problem.par, (3, 1)), times=[50.0, 100.0])
+    alone = [program.start(y0, problem.par).advance(np.array([50.0, 100.0])).y for y0 in starts]
+    assert made.status == [Status.FINISHED] * 3
+    assert np.abs(made.y - alone).max() < 1e-10  # measured 2e-13, of distances up to 41
