@@ -131,7 +131,8 @@ ORDINARY = [
     integrators.HBVM(), integrators.HBVM(tol=1e-6), integrators.HBVM(k=8, s=4, tol=1e-8),
     integrators.Gauss(s=4, tol=1e-8), made("DOP853", rtol=1e-8, atol=1e-8),
     made("LSODA", rtol=1e-6, atol=1e-9),
-    made("Radau", rtol=1e-6, atol=1e-9), made("BDF", rtol=1e-6, atol=1e-9), made("Taylor", tol=1e-12),
+    made("Radau", rtol=1e-6, atol=1e-9), made("BDF", rtol=1e-6, atol=1e-9),
+    made("Taylor", tol=1e-12, compact_mode=True),  # else it warns of a field that takes long to compile
     made("IAS15"), integrators.Gauss(s=4, h=0.05), integrators.HBVM(k=8, s=4, h=0.05),
     made("Leapfrog", h=0.01),
 ]  # fmt: skip
