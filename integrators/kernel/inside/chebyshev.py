@@ -82,7 +82,7 @@ def refine(search, degree):
     for i in range(degree + 1):
         p[FINE * i] = search.values[i]
     x[FINE * degree] = 1.0
-    search.n = FINE * degree + 1
+    search.n, search.fitted = FINE * degree + 1, degree
 
 
 @compiled
@@ -94,7 +94,26 @@ def keep_samples(search, degree):
             search.points[n] = node(search, i, degree)
             search.fine[n] = search.values[i]
             n += 1
-    search.n = n
+    search.n, search.fitted = n, 0
+
+
+@compiled
+def polynomial_at(search, point):
+    """Return the value of the polynomial at a point, by the same scheme."""
+    x, coefficients, b, c = 1.0 - 2.0 * point, search.coefficients, 0.0, 0.0
+    for j in range(search.fitted, 0, -1):
+        b, c = fma(2.0 * x, b, coefficients[j] - c), b
+    return fma(x, b, coefficients[0] - c)
+
+
+@compiled
+def is_monotone(search):
+    """Whether the values that are known at points only rise, or only fall."""
+    p, rises, falls = search.fine, True, True
+    for i in range(search.n - 1):
+        rises &= p[i + 1] > p[i]
+        falls &= p[i + 1] < p[i]
+    return rises or falls
 
 
 @compiled

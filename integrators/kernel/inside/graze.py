@@ -10,7 +10,7 @@ from integrators.kernel.native.jit import compiled
 from integrators.kernel.parts.surfaces import MOST_SIDES
 from integrators.kernel.simd.memory import call_field
 from integrators.kernel.step.estimate import block_size
-from integrators.kernel.step.sample import interpolate
+from integrators.kernel.step.sample import interpolate, take_polynomial
 
 DEEPER = 2.0  # times as far as a parabola may fall between its points, a distance may fall
 NEAREST = 1e-10  # of a step: how well it is known where a distance is smallest, or 0
@@ -61,6 +61,7 @@ def may_vanish(before, here, after, back, ahead):
 @compiled
 def touches(ctx, i, low, high):
     """Whether surface i is touched between two parts of the step by more than is negligible."""
+    take_polynomial(ctx)
     x = deepest(distance_at, ctx, i, low, high, -1.0, NEAREST)
     if not distance_at(ctx, i, x) < 0.0:
         return False

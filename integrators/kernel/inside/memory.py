@@ -115,6 +115,7 @@ class Search(Memory):
     coefficients = Array(FINEST + 32)  # of Chebyshev polynomials
     # What the coefficients that follow add up to at a corner, where the j-th is like 1/j^2
     truncation = Real()
+    fitted = Integer()  # degree of the polynomial that is known at points; 0: samples are
     n = Integer()  # points where something is known
     points = Array(POINTS)
     fine = Array(POINTS)  # values of the polynomial there, or samples

@@ -1,5 +1,6 @@
 """Where a function changes its sign between two points, and where it is largest."""
 
+from integrators.kernel.inside.chebyshev import polynomial_at
 from integrators.kernel.inside.memory import TINY
 from integrators.kernel.inside.sample import is_finite, sign
 from integrators.kernel.inside.value import value_at
@@ -11,6 +12,7 @@ APART = 1e4  # units that times can be told apart by: a pole is looked at from a
 POLE, ROOM = 1e3, 10.0  # where g is as many times larger than beside it, its sign changes through infinity
 EXTREMUM = 1e-10  # of the stretch: where an extremum is, if the values near it can be told apart
 EDGE, MOVES = 1e-3, 8  # part of a bracket that is its edge; how often it is moved
+SECANTS = 3  # on the polynomial, which is nearly straight between two of the points where it is known
 NEARER = 0.125  # a point as many times closer to the start is tried next
 
 
@@ -22,8 +24,27 @@ def guess(search, a, b):
         x, y = points[i], points[i + 1]
         if y > a and x < b and sign(fine[i]) != sign(fine[i + 1]):
             slope = (fine[i + 1] - fine[i]) / (y - x)
-            return min(max(x - fine[i] / slope, a), b), slope
+            start = min(max(x - fine[i] / slope, a), b)
+            if search.fitted == 0 or abs(fine[i]) <= TINY:  # a sign without a size is not the polynomial's
+                return start, slope
+            return refined(search, max(x, a), min(y, b), start, slope)
     return (a + b) / 2.0, 0.0
+
+
+@compiled
+def refined(search, low, high, x, slope):
+    """Return where the polynomial is 0 between two close points, beginning at ``x``, and its slope."""
+    before, at_before = x, polynomial_at(search, x)
+    for _ in range(SECANTS):
+        x = min(max(before - at_before / slope, low), high)
+        if x == before:
+            break
+        value = polynomial_at(search, x)
+        if value == at_before:
+            break
+        slope = (value - at_before) / (x - before)
+        before, at_before = x, value
+    return x, slope
 
 
 @compiled

@@ -14,7 +14,7 @@ from integrators.kernel.parts.surfaces import AT_ORIGIN, END_ACROSS, MOST_SIDES,
 from integrators.kernel.simd.memory import call_field
 from integrators.kernel.step.begin import INFINITY
 from integrators.kernel.step.control import is_distinct
-from integrators.kernel.step.sample import interpolate, put_in_lanes, velocity
+from integrators.kernel.step.sample import put_in_lanes, take_polynomial, velocity, write_polynomial
 
 # What comes of a step that crosses a surface, or was to end on one: judged like all others; tried again with
 # `Controller.next_length`; it ends on the surface.
@@ -23,9 +23,9 @@ ORDINARY, AGAIN, REACHED = range(3)
 MOST_TRIALS = 16  # of lengths of a step
 MOST_EXTRAPOLATED = 1.25  # of a step is as far as its polynomial is trusted
 SECANTS = 12  # evaluations of a distance
-ON_SURFACE = 2.0**-50  # part of a step that its end may be from the surface,
-# or so much, if it has become less by no more than this: then rounding has it
-NEAR_SURFACE, LEAST_DECREASE = 1e-9, 0.1
+LAST_SECANT = 2.0**-56  # the product of two moves of a secant is about the next one
+ON_SURFACE = 2.0**-50  # part of a step that its end may be from the surface
+NEAR_SURFACE = 1e-9  # so near, the polynomial of a step tells to the last bit where the surface is
 NUDGE = 2.0**-20  # part of a step by which is looked beyond a surface
 
 
@@ -108,11 +108,13 @@ def locate(ctx, outcome, fits):
         return try_length(ctx, length)
     if outcome != DONE or not (fits or (first and surfaces.across == END_ACROSS)):
         return ORDINARY
+    if surfaces.distance <= NEAR_SURFACE and fits:
+        return REACHED
     part = part_to_surface(ctx)
     if part == 0.0:
         return ORDINARY
     apart = abs(part - 1.0)
-    if apart <= ON_SURFACE or (apart <= NEAR_SURFACE and apart >= LEAST_DECREASE * surfaces.distance):
+    if apart <= ON_SURFACE:
         return REACHED if fits else ORDINARY
     surfaces.distance = apart
     length = part * h
@@ -184,6 +186,7 @@ def part_to_surface(ctx):
     if surfaces.row == 0:
         return 0.0
     row = surfaces.row
+    take_polynomial(ctx)
     before, at = ctx.tables.nodes[ctx.k - 1], 1.0
     value_before, value = distance_at(ctx, row, before), distance_at(ctx, row, at)
     if value_before == 0.0:  # stages of a longer step were beyond this one: in fact it is 0 all along
@@ -199,10 +202,11 @@ def part_to_surface(ctx):
         if not is_number(move):
             return 0.0
         after = min(max(at + move, 0.5), MOST_EXTRAPOLATED)
-        if after == at:
+        apart = abs(at - before)
+        before, at, value_before = at, after, value
+        if abs(after - before) * apart <= LAST_SECANT:
             break
-        before, value_before = at, value
-        at, value = after, distance_at(ctx, row, after)
+        value = distance_at(ctx, row, at)
     return (
         at
         if is_number(value) and at > 0.5 and not (at == MOST_EXTRAPOLATED and value > value_before)
@@ -212,10 +216,10 @@ def part_to_surface(ctx):
 
 @compiled
 def distance_at(ctx, row, c):
-    """Return a distance at part c of the step, negative beyond a surface."""
+    """Return a distance at part c of the step, negative beyond a surface; after `take_polynomial`."""
     surfaces = ctx.surfaces
     lanes, state = ctx.lanes, surfaces.state
-    interpolate(ctx, c, state)
+    write_polynomial(ctx, c, state)
     for lane in range(lanes):
         surfaces.times[lane] = ctx.t0 + c * ctx.h
         for d in range(ctx.rows):

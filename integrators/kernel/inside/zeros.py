@@ -4,7 +4,7 @@ The polynomial of a step is cheap and only of order s + 1. So it says where zero
 states at the ends of partial steps say where they are.
 """
 
-from integrators.kernel.inside.chebyshev import near
+from integrators.kernel.inside.chebyshev import is_monotone, near
 from integrators.kernel.inside.memory import FINEST, TINY
 from integrators.kernel.inside.sample import is_finite, sign
 from integrators.kernel.inside.solve import (
@@ -217,11 +217,27 @@ def solve(ctx, search, a, b, after):
 
 
 @compiled
+def crosses_at_most_once(search):
+    """Whether the polynomial only rises or only falls, and is not near zero at an end: so it turns nowhere.
+
+    A sign without a size, at the start, has been looked at.
+    """
+    n, points, p, least = search.n, search.points, search.fine, near(search)
+    clear = (abs(p[0]) <= TINY or abs(p[0]) >= least) and abs(p[n - 1]) >= least
+    whole = points[0] == 0.0 and points[n - 1] == 1.0 and p[0] != 0.0
+    return whole and clear and search.fitted > 0 and is_monotone(search)
+
+
+@compiled
 def find_zeros(ctx, search):
     """Set the zeros in (0, 1], in order."""
     search.mark_count = search.zero_count = 0
     n, p = search.n, search.fine
     if search.scale == 0.0:  # zero all along
+        return
+    if crosses_at_most_once(search):
+        if sign(p[0]) != sign(p[n - 1]):
+            solve(ctx, search, 0.0, 1.0, sign(p[n - 1]))
         return
     first = 0
     while first < n:

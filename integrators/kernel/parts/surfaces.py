@@ -27,7 +27,7 @@ class Surfaces(Part):
     locating = Integer()  # attempts at the step ahead to end it there; 0: none
     near = Real()  # length of the longest of them that crosses none, and
     far = Real()  # of the shortest that does
-    distance = Real()  # from the surface to the end of the last one, in parts of it
+    distance = Real()  # from the end of the last one to the surface, in parts of it; infinite: none yet
     row = Integer(lasting=True)  # of the distance that vanishes there; 0: unknown
     length_wanted = Real(lasting=True)  # of the step ahead, before that
     reached = Integer(lasting=True)  # 1: the step that is solved ends on a surface

@@ -56,7 +56,20 @@ def vectors_of_state(ctx):
 
 @compiled
 def interpolate(ctx, c, out):
-    """Write the collocation polynomial of the solved step at t + c h.
+    """Write the collocation polynomial of the solved step at t + c h."""
+    take_polynomial(ctx)
+    write_polynomial(ctx, c, out)
+
+
+@compiled
+def take_polynomial(ctx):
+    """Set the coefficients that `write_polynomial` reads."""
+    project(ctx, ctx.tables.projection, ctx.tables.groups)
+
+
+@compiled
+def write_polynomial(ctx, c, out):
+    """As `interpolate`, after `take_polynomial`.
 
     With the coefficients gamma of the field, y + h sum_j gamma_j int_0^c P_j; in
     second-order form the positions take the integrals of that polynomial's slope,
@@ -65,7 +78,6 @@ def interpolate(ctx, c, out):
     tables = ctx.tables
     rows, second, h = ctx.rows, ctx.second, ctx.h
     state, gamma = ctx.state, ctx.scratch.coefficients
-    project(ctx, tables.projection, tables.groups)
     write(ctx, ctx.error, out)
     x = 2.0 * c - 1.0
     # Integrals of P_{j-1}, P_j, P_{j+1}, by int_0^c L_j = (L_{j+1} - L_{j-1}) / (2 (2j+1)) for j > 0.
@@ -75,8 +87,10 @@ def interpolate(ctx, c, out):
         after = ((2.0 * j + 3.0) * x * legendre - (j + 1.0) * before) / (j + 2.0)
         upper = (after - before) / (2.0 * (2.0 * j + 3.0) ** 0.5) if j + 1 < ctx.s else 0.0
         slope_weight = h * here
-        weight = 0.5 * here if j == 0 else -lower / (2.0 * (4.0 * j * j - 1.0) ** 0.5)
-        weight = h * (weight + upper / (2.0 * (4.0 * (j + 1.0) * (j + 1.0) - 1.0) ** 0.5))
+        weight = 0.0
+        if second:
+            weight = 0.5 * here if j == 0 else -lower / (2.0 * (4.0 * j * j - 1.0) ** 0.5)
+            weight = h * (weight + upper / (2.0 * (4.0 * (j + 1.0) * (j + 1.0) - 1.0) ** 0.5))
         i = tables.first + j
         for d in range(rows):
             value = gamma[((i // 8) * ctx.padded + d) * 8 + i % 8]
