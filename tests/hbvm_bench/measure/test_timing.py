@@ -117,7 +117,7 @@ def test_a_case_s_clock_begins_when_all_is_compiled(monkeypatch):
     asked = Case(problem="pendulum()", method="", ensemble=Ensemble(count=3, spread=0.1))
     problem = problems.load("pendulum", t_end=1.0)
     resolved = SimpleNamespace(case=asked, id="1", method=Method(), problem=problem)
-    monkeypatch.setattr(worker, "resolve", lambda case: resolved)
+    monkeypatch.setattr(worker, "resolve", lambda case, known: resolved)
     monkeypatch.setattr(timing, "time_together", lambda runs, *_: [runs[0].program.now])
     row = Record(id="1", case=asked, role="ours", library="", order=1, result=task.NO_RESULT)
     request = task.Request(rows=[row], limits=Limits(), plan=TimingPlan())
