@@ -76,9 +76,12 @@ class Ended(NamedTuple):
 
 
 def library() -> ctypes.CDLL | None:
-    """Return SUNDIALS as scikit-sundae has loaded it; ``None`` where its functions are not found."""
+    """Return SUNDIALS as scikit-sundae has loaded it; ``None`` where its functions or types are others."""
+    import sksundae._cy_common as built  # pyright: ignore[reportMissingImports]
     import sksundae._cy_cvode  # pyright: ignore[reportMissingImports]
 
+    if (built.SUNDIALS_INT_TYPE, built.SUNDIALS_FLOAT_TYPE) != ("int", "double"):
+        return None
     loaded = ctypes.CDLL(sksundae._cy_cvode.__file__)  # names are looked up in what it depends on, too
     try:
         for name, (result, *arguments) in SIGNATURES.items():
