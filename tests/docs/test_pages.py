@@ -35,6 +35,7 @@ def test_every_file_of_the_repository_that_a_page_names_is_there(page):
     text = page.read_text(encoding="utf-8")
     named = re.findall(r"`((?:tests|examples|integrators|problems|hbvm_bench|docs)/[\w/]+\.\w+)`", text)
     examples = {
+        "integrators/peers/NAME.py",
         "problems/catalogue/NAME.py",
         "hbvm_bench/studies/NAME.toml",
         "problems/catalogue/quartic.py",

@@ -161,7 +161,8 @@ def wrong(case: Case) -> tuple[Any, ...] | None:
         return *known, "evaluations", made.stats.evaluations, usual.stats.evaluations
     had = re.search(r"or tol=(\S+) or more", made.reason)
     if had and case.method().options().get("h") is None:
-        again = integrate(case.problem(), HBVM(tol=float(had[1]), max_steps=most), [END])
+        # Measured: 176 of 168.
+        again = integrate(case.problem(), HBVM(tol=float(had[1]), max_steps=2 * most), [END])
         if again.status != Status.FINISHED:
             return *known, had[0], again.reason
     return None

@@ -73,4 +73,7 @@ def test_only_cases_that_ask_have_other_ids():
     plain, back, asked = map(id_of, (Checks(), Checks(reversal=0.5), Checks(chaos=True)))
     assert len({plain, back, asked}) == 3
     resolved = resolve(Case(problem="kepler", method=METHOD, checks=Checks(reversal=0.5)))
-    assert case_key(resolved.case, resolved.problem, resolved.method)["checks"]["reversal"] == 0.5
+    assert (
+        case_key(resolved.case, resolved.problem, resolved.method, resolved.times)["checks"]["reversal"]
+        == 0.5
+    )

@@ -30,7 +30,7 @@ def optimized(text):
 
 
 def test_all_loops_over_numbers_are_unrolled_and_llvm_warns_of_none(capfd):
-    text = lanes.text((8,))
+    text = lanes.text((8, 8))
     made = optimized(unrolling(text))
     assert capfd.readouterr().err == ""
     assert "alloca" not in made  # rows are in registers
