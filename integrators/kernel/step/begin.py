@@ -21,7 +21,7 @@ from integrators.kernel.step.fixed_point import (
     through,
 )
 from integrators.kernel.step.rule import FARTHEST
-from integrators.kernel.step.share import share
+from integrators.kernel.step.share import share, shared
 from integrators.kernel.step.size import take_sizes
 from integrators.kernel.step.stages import momentum_place, offset
 from integrators.kernel.step.sums import multiplied, part_of_drift, time_of_step
@@ -71,7 +71,7 @@ def set_times(ctx):
 def prepare(ctx):
     """Set the stages' times, and what they have without the field's values, from the state."""
     set_times(ctx)
-    if ctx.team:
+    if shared(ctx):
         share(ctx, PREPARE, ctx.tables.matrix)
     else:
         prepare_rows(ctx, 0, ctx.rows)

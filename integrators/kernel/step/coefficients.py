@@ -14,7 +14,7 @@ from integrators.kernel.parts.estimate import (
 from integrators.kernel.parts.team import COEFFICIENTS
 from integrators.kernel.simd.lanes import fma
 from integrators.kernel.simd.memory import get, put, splat8, sums
-from integrators.kernel.step.share import share
+from integrators.kernel.step.share import share, shared
 from integrators.kernel.step.stages import offset
 
 
@@ -63,7 +63,7 @@ def take_coefficients_of_two(ctx, first, last):
 @compiled
 def take_coefficients(ctx):
     """Set what is known of the field from its values in the solved step, row by row."""
-    if ctx.team:
+    if shared(ctx):
         share(ctx, COEFFICIENTS, ctx.tables.matrix)
     else:
         take_coefficients_of_rows(ctx, 0, ctx.rows)

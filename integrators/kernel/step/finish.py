@@ -12,7 +12,7 @@ from integrators.kernel.parts.team import FINISH
 from integrators.kernel.simd.memory import call_line, get, largest, put, splat8, sums_and_errors, swap
 from integrators.kernel.simd.operations import fma, two_sum
 from integrators.kernel.step.projection import project_onto_energy
-from integrators.kernel.step.share import largest_result, share
+from integrators.kernel.step.share import largest_result, share, shared
 from integrators.kernel.step.stages import momentum_place, offset
 from integrators.kernel.step.sums import multiplied
 
@@ -123,7 +123,7 @@ def finish_unprojected(ctx):
         return call_line(ctx.line, END, ctx)
     if ctx.solved == BY_INCREMENT:
         return finish_by_increment(ctx)
-    if ctx.team:
+    if shared(ctx):
         share(ctx, FINISH, ctx.tables.matrix)
         damage = largest_result(ctx)
     else:

@@ -31,7 +31,7 @@ from integrators.kernel.simd.memory import (
     splat8,
     spread,
 )
-from integrators.kernel.step.share import largest_result, share
+from integrators.kernel.step.share import largest_result, share, shared
 from integrators.kernel.step.size import change_of_rows
 from integrators.kernel.step.stages import group_offset, offset
 
@@ -45,7 +45,7 @@ def evaluate(ctx):
     if ctx.line:
         call_line(ctx.line, VALUES, ctx)
         return
-    if ctx.team:
+    if shared(ctx):
         share(ctx, FIELD, ctx.tables.matrix)
         return
     field, par = ctx.field, ctx.par
@@ -208,7 +208,7 @@ def product_of_rows(ctx, table, first, last):
 @compiled
 def product(ctx, table):
     """Stages from the field's values, by the route that the sizes call for."""
-    if ctx.team:
+    if shared(ctx):
         share(ctx, PRODUCT, table)
     else:
         product_of_rows(ctx, table, 0, ctx.rows)
@@ -217,7 +217,7 @@ def product(ctx, table):
 @compiled
 def product_of_two(ctx, table):
     """As `product`, of eight values of this step and of the one before."""
-    if ctx.team:
+    if shared(ctx):
         share(ctx, PRODUCT_OF_TWO, table)
     else:
         product_of_two_of_rows(ctx, table, 0, ctx.rows)
@@ -226,7 +226,7 @@ def product_of_two(ctx, table):
 @compiled
 def product_for_one(ctx, table):
     """As `product` of 8 or 16 stages, with a table for a step of length 1."""
-    if ctx.team:
+    if shared(ctx):
         share(ctx, PRODUCT_FOR_ONE, table)
     else:
         product_for_one_of_rows(ctx, table, 0, ctx.rows)
@@ -246,7 +246,7 @@ def product_and_change_of_rows(ctx, table, first, last):
 @compiled
 def product_and_change(ctx, table):
     """As `product`; return the largest change of a stage, relative to the size of its block."""
-    if ctx.team:
+    if shared(ctx):
         share(ctx, PRODUCT_AND_CHANGE, table)
         return largest_result(ctx)
     return largest(product_and_change_of_rows(ctx, table, 0, ctx.rows))

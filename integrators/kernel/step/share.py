@@ -4,10 +4,17 @@ from integrators.kernel.native.attributes import address_of, view
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.parts.team import BLOCK, DONE_WITH, FIELD, NEXT, OPENED, Team
 from integrators.kernel.simd.atomic import increase, observe
+from integrators.kernel.simd.lanes import rarely
 from integrators.kernel.simd.memory import call_nothing, call_work, get, larger, largest, splat8
 
 team_at = view(Team)
 SPINS = 1 << 10  # looks at a number before another thread may have the processor
+
+
+@compiled
+def shared(ctx):
+    """Whether a team shares the step; else what is done for one is not inlined where steps are short."""
+    return rarely(ctx.team != 0)
 
 
 @compiled
