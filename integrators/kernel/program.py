@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -330,6 +331,10 @@ class HBVMProgram(Compiled):
 
     def part_of_field(self) -> binary.Native | None:
         """Return what sets some rows of the field, compiled or loaded, if there is such a function."""
+        return self._part
+
+    @cached_property
+    def _part(self) -> binary.Native | None:
         if not (self.system.traced and self.lanes):
             return None
         return compile_part(self.system, self._quantity, self.constants.lanes)

@@ -10,7 +10,7 @@ from typing import Any
 from integrators.kernel.context import Context
 from integrators.kernel.engines import work
 from integrators.kernel.native import binary
-from integrators.kernel.parts.team import BLOCK, CLOSED, Team
+from integrators.kernel.parts.team import BLOCK, CLOSED, PIECES, Team
 
 
 class Threads:
@@ -32,10 +32,12 @@ class Threads:
         self, count: int, contexts: tuple[Context, Context], field: binary.Native, part: binary.Native | None
     ):
         shape = contexts[0].shape
-        pieces = max(-(-shape.rows // BLOCK), -(-shape.constants.k // 8))
+        block = BLOCK * -(-shape.rows // (BLOCK * PIECES))
+        pieces = max(PIECES, -(-shape.constants.k // 8))
         self._team = Team(
             {"most": pieces}, {}, {"code": work.code(), "rest": _Rest(), "field": field, "part": part}
         )
+        self._team.block = block
         for context in contexts:
             context.team = self._team
         self._helpers, self._pool = count - 1, ThreadPoolExecutor(count - 1)

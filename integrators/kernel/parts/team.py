@@ -9,7 +9,10 @@ write to rows or stages of their own and do not depend on who does them: neither
 from integrators.kernel.native.memory import Array, Integer, Memory, Pointer
 
 BLOCK = 256
-"""Rows of a piece."""
+"""Rows of a piece are a multiple of these."""
+
+PIECES = 16
+"""Of a job at most: more are no use to a few threads, and to claim one takes as long as a thousand rows."""
 
 # Jobs.
 FIELD, PRODUCT, PRODUCT_OF_TWO, PRODUCT_FOR_ONE, PRODUCT_AND_CHANGE = range(5)
@@ -33,3 +36,4 @@ class Team(Memory):
     pieces = Array(32, kind=int)  # numbers: the next piece, how many are opened and done; 1: all is over
     most = Integer()  # pieces of a job
     results = Array(8, "most")  # of the pieces
+    block = Integer()  # rows of a piece

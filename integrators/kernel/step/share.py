@@ -2,7 +2,7 @@
 
 from integrators.kernel.native.attributes import address_of, view
 from integrators.kernel.native.jit import compiled
-from integrators.kernel.parts.team import BLOCK, DONE_WITH, FIELD, NEXT, OPENED, Team
+from integrators.kernel.parts.team import DONE_WITH, FIELD, NEXT, OPENED, Team
 from integrators.kernel.simd.atomic import increase, observe
 from integrators.kernel.simd.lanes import rarely
 from integrators.kernel.simd.memory import call_nothing, call_work, get, larger, largest, splat8
@@ -31,7 +31,7 @@ def share(ctx, job, table):
     team = team_at(ctx.team)
     pieces, first = team.pieces, observe(team.pieces, NEXT)
     team.context, team.job, team.table, team.first = address_of(ctx), job, table, first
-    count = (ctx.rows + BLOCK - 1) // BLOCK
+    count = (ctx.rows + team.block - 1) // team.block
     if job == FIELD and team.part == 0:
         count = ctx.calls * (ctx.lanes >> 3)
     increase(pieces, OPENED, count)
@@ -44,8 +44,9 @@ def share(ctx, job, table):
 @compiled
 def largest_result(ctx):
     """Return the largest of the results of the pieces of the last job; NaN if any is."""
-    results = team_at(ctx.team).results
+    team = team_at(ctx.team)
+    results = team.results
     top = splat8(0.0)
-    for piece in range((ctx.rows + BLOCK - 1) // BLOCK):
+    for piece in range((ctx.rows + team.block - 1) // team.block):
         top = larger(top, get(results, 8 * piece))
     return largest(top)

@@ -4,7 +4,6 @@ from integrators.kernel.context import Context
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.parts.team import (
-    BLOCK,
     CLOSED,
     COEFFICIENTS,
     DONE_WITH,
@@ -55,8 +54,8 @@ def do(ctx, team, piece):
         start = offset(ctx, piece)
         call_field(team.field, ctx.times + 8 * piece, ctx.stages + start, ctx.par, ctx.values + start)
         return
-    first = BLOCK * piece
-    last = min(first + BLOCK, ctx.rows)
+    first = team.block * piece
+    last = min(first + team.block, ctx.rows)
     if job == FIELD:
         for call in range(ctx.calls):
             times, shift = ctx.times + ctx.lanes * call, ctx.lanes * ctx.padded * call
