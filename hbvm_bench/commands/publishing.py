@@ -7,7 +7,7 @@ import typer
 
 from hbvm_bench.report import terminal
 from hbvm_bench.report.document import Document
-from hbvm_bench.report.page import Results, beside, gather, page_of
+from hbvm_bench.report.page import Results, beside, gather, page_of, parts_in
 from hbvm_bench.report.stored import contents, joined
 from hbvm_bench.report.write import write
 from hbvm_bench.store.store import PACKED, Store
@@ -30,7 +30,7 @@ def report_on(
     if len(stores) == 1 and stores[0].index().campaign.page.by_processor:
         stores = joined(stores[0], directory / PACKED)
     results = gather(stores, beside(directory) or study)
-    document = page_of(results)
+    document = page_of(results, parts_in(directory))
     publish(document, directory, contents(results, stores), stderr=stderr)
     return results
 

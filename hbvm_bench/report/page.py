@@ -209,6 +209,12 @@ def page_of(results: Results, parts: dict[str, Results] | None = None) -> Docume
     return _made(page_file(results.study if single else None), {"": results, **(parts or {})}, values)
 
 
+def parts_in(place: Path) -> dict[str, Results]:
+    """Return the results in the folders of a report's folder, by their names."""
+    found = {path.parent.name: path for path in sorted(place.glob(f"*/{PACKED}"))}
+    return {name: gather(Store(path).runs(), place=f"{name}/") for name, path in found.items()}
+
+
 def page_in(place: Path) -> Document:
     """Return the page of a report's folder, of the results in it and in the folders in it, by their names.
 
@@ -217,11 +223,10 @@ def page_in(place: Path) -> Document:
     problems.errors.InputError
         If there are none, and what `gather` and `find` raise.
     """
-    found = {path.parent.name: path for path in sorted(place.glob(f"*/{PACKED}"))}
-    parts = {name: gather(Store(path).runs(), place=f"{name}/") for name, path in found.items()}
+    parts = parts_in(place)
     if (place / PACKED).is_file():
         return page_of(gather(Store(place / PACKED).runs(), beside(place)), parts)
-    if not found or not (place / template.NAME).is_file():
+    if not parts or not (place / template.NAME).is_file():
         raise InputError(f"the folder {str(place)!r} has no results, or no {template.NAME}.")
     return _made(place / template.NAME, parts, {})
 

@@ -7,6 +7,7 @@ import pytest
 
 from hbvm_bench.campaign.file import STUDY, parse, shipped
 from hbvm_bench.cli import main
+from hbvm_bench.commands.publishing import report_on
 from hbvm_bench.report import markdown, template
 from hbvm_bench.report.document import Details, Links, Note, Picture, Section
 from hbvm_bench.report.page import check, document, find, page_file, page_in
@@ -70,6 +71,20 @@ def test_a_page_has_what_its_template_says_in_this_order(store, tmp_path):
     assert said.startswith("# Mine\n\nTwo 3.\n\n## Sources")
     assert said.index("## Sources") < said.index("| # | method")
     assert "Fairness" not in said
+
+
+def test_a_run_is_reported_in_a_folder_whose_page_has_results_of_folders_in_it(store, tmp_path):
+    whole = tmp_path / "report"
+    part = whole / "part"
+    part.mkdir(parents=True)
+    (part / NAME).write_text('# Part\n\n{{ block("sources") }}\n', encoding="utf-8")
+    report_on([store], part)
+    text = '# Whole\n\n{{ frame("").index.size }} and {{ frame("part").index.size }}.\n'
+    (whole / NAME).write_text(text + '\n{{ block("sources", "part") }}\n', encoding="utf-8")
+    report_on([store], whole)
+    written = (whole / TEXT).read_text(encoding="utf-8")
+    assert written.startswith("# Whole\n\n3 and 3.\n\n## Sources")
+    assert markdown.markdown(page_in(whole)) == written
 
 
 def test_markdown_of_a_template_is_blocks():
