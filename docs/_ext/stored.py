@@ -32,7 +32,8 @@ class Stored:
         table : str
             Part of the line above the table: its caption or a heading; or of the head of the table.
         row : str
-            Parts of the row's cells, separated by ``|``; each must be in another cell.
+            Parts of the row's cells, separated by ``|``; each must be in another cell, or be
+            the whole of it where it begins with ``=``.
         column : str
             The head of the column.
         digits
@@ -49,7 +50,7 @@ class Stored:
             for above, head, rows in tables(report)
             if (table in above or table in head) and column in head
             for cells in rows
-            if all(any(part in cell for cell in cells) for part in wanted)
+            if all(any(_stands(part, cell) for cell in cells) for part in wanted)
         ]
         where = f"{row!r}, {column!r} of {table!r} in the report {report!r}"
         if len(found) != 1:
@@ -75,6 +76,10 @@ def tables(report: str) -> list[tuple[str, list[str], list[list[str]]]]:
         else:
             made.append((above, _cells(line), []))
     return [(above, head, _labelled(rows[1:])) for above, head, rows in made]
+
+
+def _stands(part: str, cell: str) -> bool:
+    return cell == part[1:] if part.startswith("=") else part in cell
 
 
 def _cells(line: str) -> list[str]:
