@@ -12,7 +12,7 @@ BLOCK = 256
 """Rows of a piece are a multiple of these."""
 
 PIECES = 16
-"""Of a job at most: twenty steps of 100,000 rows and 8 stages take 52 ms with 16, 87 with 64, 121 with 400."""
+"""Of a job at most: twenty steps of 100,000 rows, 8 stages, take 52 ms with 16, 87 with 64, 121 with 400."""
 
 # Jobs.
 FIELD, PRODUCT, PRODUCT_OF_TWO, PRODUCT_FOR_ONE, PRODUCT_AND_CHANGE = range(5)
