@@ -8,21 +8,10 @@ from integrators.caveats import undetected, undetected_in_time, unknown_disconti
 from integrators.kernel.plan import Plan
 from integrators.methods.hbvm import HBVM, Solver
 from integrators.options import Absolute, Breakpoints, Count, Stages, Step, Tolerance
-from integrators.protocol import MethodBase, Program
+from integrators.protocol import MethodBase, Program, cite
 from problems.analysis.structure import depends_on_time
 from problems.errors import InputError
 from problems.problem import Problem, System
-
-CITATION = """\
-@book{HairerLubichWanner2006,
-  author = {Hairer, Ernst and Lubich, Christian and Wanner, Gerhard},
-  title = {Geometric Numerical Integration},
-  edition = {2},
-  publisher = {Springer},
-  year = {2006}
-}
-"""
-
 
 Steps = Literal["reversible"]
 Precision = Literal["double", "double-double"]
@@ -114,7 +103,7 @@ class Gauss(MethodBase):
     library = "hbvm-bench"
     built = "compiled on this machine by numba"
     computes_with = ("numpy", "numba", "llvmlite")
-    citation = CITATION
+    citation = cite("HairerLubichWanner2006")
     family = "gauss"
 
     def __post_init__(self) -> None:

@@ -7,19 +7,10 @@ from integrators.caveats import undetected, undetected_in_time, unknown_disconti
 from integrators.kernel.plan import Plan
 from integrators.methods.automatic import ACCURATE_IN_LANES, WIDE, choose, choose_projected, nodes_of
 from integrators.options import Absolute, Breakpoints, Count, Stages, Step, Tolerance
-from integrators.protocol import MethodBase, Program
+from integrators.protocol import MethodBase, Program, cite
 from problems.errors import InputError
 from problems.graph.nodes import T
 from problems.problem import Problem, System
-
-CITATION = """\
-@book{BrugnanoIavernaro2016,
-  author = {Brugnano, Luigi and Iavernaro, Felice},
-  title = {Line Integral Methods for Conservative Problems},
-  publisher = {Chapman and Hall/CRC},
-  year = {2016}
-}
-"""
 
 TOLERANCE = 3e-16
 """The tolerance of a method that is given neither a step nor a tolerance."""
@@ -194,7 +185,7 @@ class HBVM(MethodBase):
     library = "hbvm-bench"
     built = "compiled on this machine by numba"
     computes_with = ("numpy", "numba", "llvmlite")
-    citation = CITATION
+    citation = cite("BrugnanoIavernaro2016")
     family = "hbvm"
 
     def __repr__(self) -> str:

@@ -6,26 +6,11 @@ from typing import Annotated, Any
 
 from integrators.caveats import undetected
 from integrators.kernel.plan import Plan
-from integrators.methods.hbvm import CITATION as BOOK
 from integrators.options import Absolute, Stages, Step, Tolerance
-from integrators.protocol import MethodBase, Program
+from integrators.protocol import MethodBase, Program, cite
 from problems.checks import refusal
 from problems.errors import InputError
 from problems.problem import Problem, System
-
-CITATION = (
-    """\
-@article{BrugnanoIavernaro2012,
-  author = {Brugnano, Luigi and Iavernaro, Felice},
-  title = {Line integral methods which preserve all invariants of conservative problems},
-  journal = {Journal of Computational and Applied Mathematics},
-  volume = {236},
-  pages = {3905--3919},
-  year = {2012}
-}
-"""
-    + BOOK
-)
 
 
 class _Names:
@@ -133,7 +118,7 @@ class LineIntegral(MethodBase):
     library = "hbvm-bench"
     built = "compiled on this machine by numba"
     computes_with = ("numpy", "numba", "llvmlite")
-    citation = CITATION
+    citation = cite("BrugnanoIavernaro2012", "BrugnanoIavernaro2016")
     family = "line integral"
 
     def __post_init__(self) -> None:

@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 
 from integrators.peers import load
-from integrators.protocol import Array
+from integrators.protocol import Array, cite
 from integrators.stepping import FixedStep, March
 from problems.errors import InputError
 from problems.problem import Problem, System
@@ -19,24 +19,6 @@ Type = Literal[
 ORDERS = {"Verlet": 2, "M2": 2, "Yo6": 6, "Yos6": 6, "BM6": 6, "RKN6a": 6, "RKN6b": 6, "Yo8": 8}
 KICK_LAST = ("PEFRL", "RKN6a", "ABA104", "ABA864", "ABA1064")
 """Types that begin with a drift; the others begin with a kick, or do not care."""
-
-BLANES_MOAN = """\
-@article{BlanesMoan2002,
-  author = {Blanes, Sergio and Moan, Per Christian},
-  title = {Practical symplectic partitioned {Runge}--{Kutta} and {Runge}--{Kutta}--{Nystr{\\"o}m} methods},
-  journal = {Journal of Computational and Applied Mathematics},
-  volume = {142},
-  number = {2},
-  pages = {313--330},
-  year = {2002},
-  doi = {10.1016/S0377-0427(01)00492-7}
-}
-@misc{pyhamsys,
-  author = {Chandre, Cristel},
-  title = {{pyHamSys}: some tools for {Hamiltonian} systems},
-  howpublished = {\\url{https://github.com/cchandre/pyhamsys}}
-}
-"""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -74,7 +56,7 @@ class Composition(FixedStep):
     built = "a loop in Python; maps compiled on this machine by numba"
     computes_with = ("numpy", "numba")
     family = "splitting"
-    citation = BLANES_MOAN
+    citation = cite("BlanesMoan2002", "pyhamsys")
 
     @property
     def order(self) -> int:

@@ -11,36 +11,10 @@ import numpy as np
 
 from integrators.options import Count, NotNegative
 from integrators.peers import load
-from integrators.protocol import Array
+from integrators.protocol import Array, cite
 from integrators.stepping import FixedStep, March
 from problems.errors import InputError
 from problems.problem import Problem, System
-
-PYNAMICALSYS = """\
-@article{RolimSalesEtAl2025,
-  author = {Rolim Sales, Matheus and Costa de Souza, Leonardo and Borin, Daniel and Mugnaine, Michele and
-            Szezech, Jos{\\'e} Danilo and Viana, Ricardo Luiz and Caldas, Iber{\\^e} Luiz and
-            Leonel, Edson Denis and Antonopoulos, Chris G.},
-  title = {{pynamicalsys}: a {Python} toolkit for the analysis of dynamical systems},
-  journal = {Chaos, Solitons \\& Fractals},
-  volume = {201},
-  pages = {117269},
-  year = {2025},
-  doi = {10.1016/j.chaos.2025.117269}
-}
-"""
-YOSHIDA = """\
-@article{Yoshida1990,
-  author = {Yoshida, Haruo},
-  title = {Construction of higher order symplectic integrators},
-  journal = {Physics Letters A},
-  volume = {150},
-  number = {5--7},
-  pages = {262--268},
-  year = {1990},
-  doi = {10.1016/0375-9601(90)90092-3}
-}
-"""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -75,7 +49,7 @@ class Yoshida4(FixedStep):
     family = "splitting"
     order = 4
     evaluations = 6  # each of its steps of the velocity Verlet method has two
-    citation = YOSHIDA + PYNAMICALSYS
+    citation = cite("Yoshida1990", "RolimSalesEtAl2025")
 
     def accepts(self, problem: Problem) -> str | None:
         """Say why a problem is not taken."""
@@ -143,7 +117,7 @@ class ImplicitMidpoint(FixedStep):
     computes_with = ("numpy", "numba")
     family = "Gauss"
     order = 2
-    citation = PYNAMICALSYS
+    citation = cite("RolimSalesEtAl2025")
 
     def accepts(self, problem: Problem) -> str | None:
         """Say why a problem is not taken."""

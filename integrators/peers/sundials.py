@@ -9,24 +9,11 @@ import numpy as np
 
 from integrators.options import NotNegative, Share
 from integrators.peers import cvode, load
-from integrators.protocol import Array, MethodBase, Status, UserError
+from integrators.protocol import Array, MethodBase, Status, UserError, cite
 from integrators.running.watchdog import StallDetector, stall_detector
 from integrators.stepping import ProgramBase, StepperBase
 from problems.problem import System
 
-SUNDIALS = """\
-@article{HindmarshEtAl2005,
-  author = {Hindmarsh, Alan C. and Brown, Peter N. and Grant, Keith E. and Lee, Steven L. and Serban, Radu and
-            Shumaker, Dan E. and Woodward, Carol S.},
-  title = {{SUNDIALS}: suite of nonlinear and differential/algebraic equation solvers},
-  journal = {ACM Transactions on Mathematical Software},
-  volume = {31},
-  number = {3},
-  pages = {363--396},
-  year = {2005},
-  doi = {10.1145/1089014.1089020}
-}
-"""
 UNMOVED = 100  # steps in succession that leave t as it is, after which CVODE would go on for ever
 ENDLESS = 2**31 - 1  # steps of one call, which the watchdog ends instead
 DENSE, SPARSE = 64, 0.1  # a Jacobian of more rows, of which a smaller part is not zero, is a sparse matrix
@@ -66,7 +53,7 @@ class CVODE(MethodBase):
     built = "generic wheel; vector field and Jacobian compiled on this machine by numba"
     computes_with = ("numpy", "numba")
     family = "multistep"
-    citation = SUNDIALS
+    citation = cite("HindmarshEtAl2005")
     to_end = "stop"
 
     def compile(self, system: System) -> "CVODEProgram":

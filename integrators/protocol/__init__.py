@@ -92,6 +92,7 @@ from integrators.protocol.protocol import (  # noqa: F401 -- some are for this p
     Stepper,
     check_problem,
     check_system,
+    cite,
 )
 from integrators.protocol.values import (  # noqa: F401 -- some are for this package only
     SAMPLINGS,

@@ -1,8 +1,10 @@
 """What every method, program and stepper satisfies."""
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import wraps
+from functools import cache, wraps
+from pathlib import Path
 from typing import Any, ClassVar, Protocol, cast, runtime_checkable
 
 from integrators.protocol.values import Array, Samples, Stats, Status
@@ -92,6 +94,17 @@ class Compiled:
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self.method).compile, (self.method, self.system)
+
+
+def cite(*keys: str) -> str:
+    """Return the entries of ``citations.bib`` with these keys, one after another."""
+    return "".join(map(_citations().__getitem__, keys))
+
+
+@cache
+def _citations() -> dict[str, str]:
+    text = Path(__file__).with_name("citations.bib").read_text(encoding="utf-8")
+    return {entry[2]: entry[1] for entry in re.finditer(r"^(@\w+\{(\w+),.*?^\}\n)", text, re.M | re.S)}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,21 +7,12 @@ from typing import ClassVar
 from integrators.options import NotNegative, Share, Step
 from integrators.peers import UNTRACED
 from integrators.peers.diffrax.steps import DiffraxProgram
-from integrators.protocol import MethodBase
+from integrators.protocol import MethodBase, cite
 from problems.errors import InputError
 from problems.problem import Problem, System
 
 NO_FMA = ("xla_cpu_max_isa=AVX ", "xla_cpu_max_isa=SSE4_2 ")
 """Settings of XLA_FLAGS, followed by a space, with which XLA has no instruction that fuses."""
-
-KIDGER = """\
-@phdthesis{Kidger2021,
-  author = {Kidger, Patrick},
-  title = {On Neural Differential Equations},
-  school = {University of Oxford},
-  year = {2021}
-}
-"""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -38,7 +29,7 @@ class DiffraxMethod(MethodBase):
     built = "compiled on this machine by XLA"
     computes_with = ("jax", "jaxlib", "equinox", "lineax", "optimistix")
     to_end = "end"
-    citation = KIDGER
+    citation = cite("Kidger2021")
 
     def accepts(self, problem: Problem) -> str | None:
         """Return None, or why not."""
@@ -119,20 +110,7 @@ class LeapfrogMidpoint(_FixedMethod):
 
     order = 2
     family = "multistep"
-    citation = (
-        KIDGER
-        + """\
-@article{Shampine2009,
-  author = {Shampine, L. F.},
-  title = {Stability of the leapfrog/midpoint method},
-  journal = {Applied Mathematics and Computation},
-  volume = {208},
-  number = {1},
-  pages = {293--298},
-  year = {2009}
-}
-"""
-    )
+    citation = cite("Kidger2021", "Shampine2009")
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -154,17 +132,7 @@ class ReversibleHeun(_FixedMethod):
 
     order = 2
     family = "reversible"
-    citation = (
-        KIDGER
-        + """\
-@inproceedings{KidgerFosterLiLyons2021,
-  author = {Kidger, Patrick and Foster, James and Li, Xuechen and Lyons, Terry},
-  title = {Efficient and Accurate Gradients for Neural {SDE}s},
-  booktitle = {Advances in Neural Information Processing Systems},
-  year = {2021}
-}
-"""
-    )
+    citation = cite("Kidger2021", "KidgerFosterLiLyons2021")
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -218,20 +186,7 @@ class Dopri8(_EitherMethod):
 
     order = 8
     evaluations = 13
-    citation = (
-        KIDGER
-        + """\
-@article{PrinceDormand1981,
-  author = {Prince, P. J. and Dormand, J. R.},
-  title = {High order embedded {Runge--Kutta} formulae},
-  journal = {Journal of Computational and Applied Mathematics},
-  volume = {7},
-  number = {1},
-  pages = {67--75},
-  year = {1981}
-}
-"""
-    )
+    citation = cite("Kidger2021", "PrinceDormand1981")
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -262,20 +217,7 @@ class Tsit5(_EitherMethod):
 
     order = 5
     evaluations = 6
-    citation = (
-        KIDGER
-        + """\
-@article{Tsitouras2011,
-  author = {Tsitouras, Ch.},
-  title = {{Runge--Kutta} pairs of order 5(4) satisfying only the first column simplifying assumption},
-  journal = {Computers \\& Mathematics with Applications},
-  volume = {62},
-  number = {2},
-  pages = {770--775},
-  year = {2011}
-}
-"""
-    )
+    citation = cite("Kidger2021", "Tsitouras2011")
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -307,17 +249,4 @@ class Kvaerno5(DiffraxMethod):
     order = 5
     evaluations = None
     family = "runge-kutta"
-    citation = (
-        KIDGER
-        + """\
-@article{Kvaerno2004,
-  author = {Kv{\\ae}rn{\\o}, Anne},
-  title = {Singly diagonally implicit {Runge--Kutta} methods with an explicit first stage},
-  journal = {BIT Numerical Mathematics},
-  volume = {44},
-  number = {3},
-  pages = {489--502},
-  year = {2004}
-}
-"""
-    )
+    citation = cite("Kidger2021", "Kvaerno2004")

@@ -20,7 +20,7 @@ from integrators.peers.gravity import check_gravity
 from integrators.peers.heyoka import model
 from integrators.peers.heyoka.batch import Lanes
 from integrators.peers.heyoka.events import TaylorSearch, heyoka_events
-from integrators.protocol import Array, MethodBase, Status, Trajectories
+from integrators.protocol import Array, MethodBase, Status, Trajectories, cite
 from integrators.running.watchdog import STALL_STEPS, stall_detector
 from integrators.stepping import ProgramBase, RestorableStepper
 from problems.errors import InputError
@@ -42,19 +42,6 @@ LINES, SECONDS = 166, 3.0
 
 PATIENCE = 10.0
 """Seconds of compiling of which a user is told."""
-
-CITATION = """\
-@article{BiscaniIzzo2021,
-  author = {Biscani, Francesco and Izzo, Dario},
-  title = {Revisiting high-order {Taylor} methods for astrodynamics and celestial mechanics},
-  journal = {Monthly Notices of the Royal Astronomical Society},
-  volume = {504},
-  number = {2},
-  pages = {2614--2628},
-  year = {2021},
-  doi = {10.1093/mnras/stab1032}
-}
-"""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -106,7 +93,7 @@ class Taylor(MethodBase):
 
     library = "heyoka"
     built = "compiled on this machine by LLVM"
-    citation = CITATION
+    citation = cite("BiscaniIzzo2021")
     family = "taylor"
     to_end = "stop"
 

@@ -5,17 +5,8 @@ from typing import Any
 
 from integrators.options import NotNegative, Step
 from integrators.peers.rebound.adaptive import AdaptiveMethod
-from integrators.peers.rebound.program import REBOUND, choose
-
-CITATION = """\
-@book{HairerNorsettWanner1993,
-  author = {Hairer, Ernst and N{\\o}rsett, Syvert P. and Wanner, Gerhard},
-  title = {Solving Ordinary Differential Equations {I}: Nonstiff Problems},
-  edition = {Second},
-  publisher = {Springer},
-  year = {1993}
-}
-"""
+from integrators.peers.rebound.program import choose
+from integrators.protocol import cite
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -51,7 +42,7 @@ class BS(AdaptiveMethod):
     max_dt: NotNegative = 0.0
     h: Step | None = None
 
-    citation = REBOUND + CITATION
+    citation = cite("ReinLiu2012", "HairerNorsettWanner1993")
     family = "extrapolation"
 
     def set_up(self, simulation: Any) -> None:

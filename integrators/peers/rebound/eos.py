@@ -4,25 +4,14 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from integrators.options import Count
-from integrators.peers.rebound.program import REBOUND, choose
+from integrators.peers.rebound.program import choose
 from integrators.peers.rebound.whfast import CentralMethod
+from integrators.protocol import cite
 
 Splitting = Literal["LF", "LF4", "LF6", "LF8", "LF4_2", "LF8_6_4", "PLF7_6_4", "PMLF4", "PMLF6"]
 ORDERS = {
     "LF": 2, "LF4": 4, "LF6": 6, "LF8": 8, "LF4_2": 2, "LF8_6_4": 4, "PLF7_6_4": 4, "PMLF4": 4, "PMLF6": 6,
 }  # fmt: skip
-
-CITATION = """\
-@article{Rein2020,
-  author = {Rein, Hanno},
-  title = {Embedded operator splitting methods for perturbed systems},
-  journal = {Monthly Notices of the Royal Astronomical Society},
-  volume = {492},
-  number = {4},
-  pages = {5413--5419},
-  year = {2020}
-}
-"""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -59,7 +48,7 @@ class EOS(CentralMethod):
     phi1: Splitting = "LF"
     n: Count = 2
 
-    citation = REBOUND + CITATION
+    citation = cite("ReinLiu2012", "Rein2020")
     family = "splitting"
     to_end = "stop"
     counted = False

@@ -4,21 +4,12 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
 from integrators.options import Step
-from integrators.peers.rebound.program import REBOUND, Layout, ReboundMethod, ReboundProgram, calls, choose
-from integrators.protocol import Array
+from integrators.peers.rebound.program import Layout, ReboundMethod, ReboundProgram, calls, choose
+from integrators.protocol import Array, cite
 from integrators.stepping import FixedStepper
 
 EVALUATIONS = {2: 1, 4: 3, 6: 9, 8: 17}
 """Force evaluations in a step of the leapfrog of each order."""
-
-LEAPFROG = """\
-@book{BlanesCasas2016,
-  author = {Blanes, Sergio and Casas, Fernando},
-  title = {A Concise Introduction to Geometric Numerical Integration},
-  publisher = {Chapman and Hall/CRC},
-  year = {2016}
-}
-"""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -56,7 +47,7 @@ class Leapfrog(FixedMethod):
 
     order: Literal[2, 4, 6, 8] = 2
 
-    citation = REBOUND + LEAPFROG
+    citation = cite("ReinLiu2012", "BlanesCasas2016")
     family = "splitting"
     to_end = "stop"
 

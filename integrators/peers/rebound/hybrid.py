@@ -4,32 +4,9 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from integrators.options import NotNegative
-from integrators.peers.rebound.program import REBOUND, choose
+from integrators.peers.rebound.program import choose
 from integrators.peers.rebound.whfast import CentralMethod
-
-MERCURIUS_2019 = """\
-@article{ReinEtAl2019,
-  author = {Rein, Hanno and Hernandez, David M. and Tamayo, Daniel and Brown, Garett and Eckels, Emily and
-            Holmes, Emma and Lau, Michelle and Leblanc, R{\\'e}jean and Silburt, Ari},
-  title = {Hybrid symplectic integrators for planetary dynamics},
-  journal = {Monthly Notices of the Royal Astronomical Society},
-  volume = {485},
-  number = {4},
-  pages = {5490--5497},
-  year = {2019}
-}
-"""
-TRACE_2024 = """\
-@article{LuHernandezRein2024,
-  author = {Lu, Tiger and Hernandez, David M. and Rein, Hanno},
-  title = {{TRACE}: a code for time-reversible astrophysical close encounters},
-  journal = {Monthly Notices of the Royal Astronomical Society},
-  volume = {533},
-  number = {3},
-  pages = {3708--3723},
-  year = {2024}
-}
-"""
+from integrators.protocol import cite
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -62,7 +39,7 @@ class MERCURIUS(CentralMethod):
     r_crit_hill: NotNegative = 3.0
 
     order = 2  # at a fixed perturbation, without encounters
-    citation = REBOUND + MERCURIUS_2019
+    citation = cite("ReinLiu2012", "ReinEtAl2019")
     family = "hybrid"
     to_end = "stop"
     counted = False
@@ -104,7 +81,7 @@ class TRACE(CentralMethod):
     peri_mode: Literal["FULL_BS", "PARTIAL_BS", "FULL_IAS15"] = "FULL_BS"
 
     order = 2  # at a fixed perturbation, without encounters
-    citation = REBOUND + TRACE_2024
+    citation = cite("ReinLiu2012", "LuHernandezRein2024")
     family = "hybrid"
     to_end = "stop"
     counted = False

@@ -5,34 +5,13 @@ from typing import Any, Literal
 
 from integrators.options import NotNegative, Step
 from integrators.peers.rebound.adaptive import AdaptiveMethod, AdaptiveStepper
-from integrators.peers.rebound.program import REBOUND, Layout, ReboundProgram, choose
-from integrators.protocol import Array
+from integrators.peers.rebound.program import Layout, ReboundProgram, choose
+from integrators.protocol import Array, cite
 from integrators.stepping import RestorableStepper
 from problems.errors import InputError
 from problems.problem import Problem
 
 Mode = Literal["prs23", "global", "individual", "aarseth85"]
-
-CITATION = """\
-@article{ReinSpiegel2015,
-  author = {Rein, Hanno and Spiegel, David S.},
-  title = {{IAS15}: a fast, adaptive, high-order integrator for gravitational dynamics, accurate to machine
-           precision over a billion orbits},
-  journal = {Monthly Notices of the Royal Astronomical Society},
-  volume = {446},
-  number = {2},
-  pages = {1424--1437},
-  year = {2015},
-  doi = {10.1093/mnras/stu2164}
-}
-@article{PhamReinSpiegel2024,
-  author = {Pham, Dang and Rein, Hanno and Spiegel, David},
-  title = {A new timestep criterion for {N}-body simulations},
-  journal = {The Open Journal of Astrophysics},
-  volume = {7},
-  year = {2024}
-}
-"""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -79,7 +58,7 @@ class IAS15(AdaptiveMethod):
     h: Step | None = None
 
     order = 15  # at a fixed step
-    citation = REBOUND + CITATION
+    citation = cite("ReinLiu2012", "ReinSpiegel2015", "PhamReinSpiegel2024")
     family = "gauss-radau"
 
     def __post_init__(self) -> None:

@@ -4,22 +4,11 @@ from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 from integrators.peers.rebound.fixed import FixedMethod
-from integrators.peers.rebound.program import REBOUND, choose
+from integrators.peers.rebound.program import choose
+from integrators.protocol import cite
 from problems.checks import Must
 
 Scale = Annotated[float, Must("a finite number above 0", lambda x: x > 0)]
-
-CITATION = """\
-@article{ReinTamayo2018,
-  author = {Rein, Hanno and Tamayo, Daniel},
-  title = {{JANUS}: a bit-wise reversible integrator for {N}-body dynamics},
-  journal = {Monthly Notices of the Royal Astronomical Society},
-  volume = {473},
-  number = {3},
-  pages = {3351--3357},
-  year = {2018}
-}
-"""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -49,7 +38,7 @@ class JANUS(FixedMethod):
     scale_pos: Scale = 1e-16
     scale_vel: Scale = 1e-16
 
-    citation = REBOUND + CITATION
+    citation = cite("ReinLiu2012", "ReinTamayo2018")
     family = "splitting"
     to_end = "stop"
 

@@ -19,18 +19,6 @@ from integrators.stepping import ProgramBase, StepperBase
 from problems.errors import InputError
 from problems.problem import Problem, System
 
-REBOUND = """\
-@article{ReinLiu2012,
-  author = {Rein, H. and Liu, S.-F.},
-  title = {{REBOUND}: an open-source multi-purpose {N}-body code for collisional dynamics},
-  journal = {Astronomy \\& Astrophysics},
-  volume = {537},
-  pages = {A128},
-  year = {2012},
-  doi = {10.1051/0004-6361/201118085}
-}
-"""
-
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class ReboundMethod(MethodBase):

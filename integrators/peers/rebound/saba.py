@@ -3,34 +3,14 @@
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from integrators.peers.rebound.program import REBOUND, Layout, choose
+from integrators.peers.rebound.program import Layout, choose
 from integrators.peers.rebound.whfast import CentralMethod
-from integrators.protocol import Array
+from integrators.protocol import Array, cite
 
 Type = Literal[
     "1", "2", "3", "4", "CM_1", "CM_2", "CM_3", "CM_4", "CL_1", "CL_2", "CL_3", "CL_4",
     "10_4", "8_6_4", "10_6_4", "H_8_4_4", "H_8_6_4", "H_10_6_4",
 ]  # fmt: skip
-
-CITATION = """\
-@article{LaskarRobutel2001,
-  author = {Laskar, Jacques and Robutel, Philippe},
-  title = {High order symplectic integrators for perturbed {Hamiltonian} systems},
-  journal = {Celestial Mechanics and Dynamical Astronomy},
-  volume = {80},
-  pages = {39--62},
-  year = {2001}
-}
-@article{BlanesCasasFarresLaskarMakazagaMurua2013,
-  author = {Blanes, Sergio and Casas, Fernando and Farr{\\'e}s, Ariadna and Laskar, Jacques and
-            Makazaga, Joseba and Murua, Ander},
-  title = {New families of symplectic splitting methods for numerical integration in dynamical astronomy},
-  journal = {Applied Numerical Mathematics},
-  volume = {68},
-  pages = {58--72},
-  year = {2013}
-}
-"""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -64,7 +44,7 @@ class SABA(CentralMethod):
 
     type: Type = "10_6_4"
 
-    citation = REBOUND + CITATION
+    citation = cite("ReinLiu2012", "LaskarRobutel2001", "BlanesCasasFarresLaskarMakazagaMurua2013")
     family = "wisdom-holman"
     to_end = "stop"
     unsynchronized = True

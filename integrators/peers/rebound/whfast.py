@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from integrators.peers.rebound.fixed import FixedMethod
-from integrators.peers.rebound.program import REBOUND, Layout, choose
-from integrators.protocol import Array
+from integrators.peers.rebound.program import Layout, choose
+from integrators.protocol import Array, cite
 from problems.checks import refusal, whole
 from problems.errors import InputError
 from problems.problem import Problem, System
@@ -22,39 +22,6 @@ DOMINANCE = 10.0
 
 RADIAL = 1e-6
 """Sine of the angle between position and velocity below which an orbit counts as radial."""
-
-WHFAST = """\
-@article{ReinTamayo2015,
-  author = {Rein, Hanno and Tamayo, Daniel},
-  title = {{WHFAST}: a fast and unbiased implementation of a symplectic {Wisdom-Holman} integrator for
-           long-term gravitational simulations},
-  journal = {Monthly Notices of the Royal Astronomical Society},
-  volume = {452},
-  number = {1},
-  pages = {376--388},
-  year = {2015},
-  doi = {10.1093/mnras/stv1257}
-}
-@article{ReinTamayoBrown2019,
-  author = {Rein, Hanno and Tamayo, Daniel and Brown, Garett},
-  title = {High-order symplectic integrators for planetary dynamics and their implementation in {REBOUND}},
-  journal = {Monthly Notices of the Royal Astronomical Society},
-  volume = {489},
-  number = {4},
-  pages = {4632--4640},
-  year = {2019},
-  doi = {10.1093/mnras/stz2503}
-}
-@article{WisdomHolman1991,
-  author = {Wisdom, Jack and Holman, Matthew},
-  title = {Symplectic maps for the {N}-body problem},
-  journal = {The Astronomical Journal},
-  volume = {102},
-  pages = {1528--1538},
-  year = {1991},
-  doi = {10.1086/115978}
-}
-"""
 
 
 class _Permutation:
@@ -149,7 +116,7 @@ class WHFast(CentralMethod):
     body_order: Annotated[tuple[int, ...], _Permutation()] | None = None
 
     order = 2  # in h, at a fixed perturbation
-    citation = REBOUND + WHFAST
+    citation = cite("ReinLiu2012", "ReinTamayo2015", "ReinTamayoBrown2019", "WisdomHolman1991")
     family = "wisdom-holman"
     to_end = "stop"
     unsynchronized = True

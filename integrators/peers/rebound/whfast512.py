@@ -11,9 +11,9 @@ from typing import Any, Literal
 
 from integrators.peers import load
 from integrators.peers.rebound.fixed import FixedMethod, ReboundStepper
-from integrators.peers.rebound.program import REBOUND, Layout, ReboundProgram, calls, choose
-from integrators.peers.rebound.whfast import WHFAST, WHFast
-from integrators.protocol import Array
+from integrators.peers.rebound.program import Layout, ReboundProgram, calls, choose
+from integrators.peers.rebound.whfast import WHFast
+from integrators.protocol import Array, cite
 from problems.problem import Problem, System
 
 MOST_BODIES = 9
@@ -52,7 +52,7 @@ class WHFast512(FixedMethod):
     corrector: Literal[0, 17] = 0
 
     order = 2  # in h, at a fixed perturbation
-    citation = REBOUND + WHFAST
+    citation = cite("ReinLiu2012", "ReinTamayo2015", "ReinTamayoBrown2019", "WisdomHolman1991")
     family = "wisdom-holman"
 
     def refuses(self, system: System, par: Array) -> str | None:

@@ -7,70 +7,12 @@ import numpy as np
 
 from integrators.options import NotNegative, Share
 from integrators.peers.scipy.steps import SciPyProgram
-from integrators.protocol import MethodBase
+from integrators.protocol import MethodBase, cite
 from problems.errors import InputError
 from problems.problem import System
 
 RTOL_FLOOR = 100 * float(np.finfo(np.float64).eps)
 """SciPy silently raises a smaller rtol to this (`scipy.integrate._ivp.common.validate_tol`)."""
-
-SCIPY = """\
-@article{Virtanen2020,
-  author = {Virtanen, Pauli and Gommers, Ralf and Oliphant, Travis E. and others},
-  title = {{SciPy} 1.0: fundamental algorithms for scientific computing in {Python}},
-  journal = {Nature Methods},
-  volume = {17},
-  pages = {261--272},
-  year = {2020},
-  doi = {10.1038/s41592-019-0686-2}
-}
-"""
-
-HAIRER_I = """\
-@book{HairerNorsettWanner1993,
-  author = {Hairer, Ernst and N{\\o}rsett, Syvert P. and Wanner, Gerhard},
-  title = {Solving Ordinary Differential Equations {I}: Nonstiff Problems},
-  edition = {Second},
-  publisher = {Springer},
-  year = {1993}
-}
-"""
-
-HAIRER_II = """\
-@book{HairerWanner1996,
-  author = {Hairer, Ernst and Wanner, Gerhard},
-  title = {Solving Ordinary Differential Equations {II}: Stiff and Differential-Algebraic Problems},
-  edition = {Second},
-  publisher = {Springer},
-  year = {1996}
-}
-"""
-
-
-SHAMPINE = """\
-@article{ShampineReichelt1997,
-  author = {Shampine, Lawrence F. and Reichelt, Mark W.},
-  title = {The {MATLAB} {ODE} suite},
-  journal = {SIAM Journal on Scientific Computing},
-  volume = {18},
-  number = {1},
-  pages = {1--22},
-  year = {1997}
-}
-"""
-
-PETZOLD = """\
-@article{Petzold1983,
-  author = {Petzold, Linda},
-  title = {Automatic selection of methods for solving stiff and nonstiff systems of ordinary differential
-           equations},
-  journal = {SIAM Journal on Scientific and Statistical Computing},
-  volume = {4},
-  number = {1},
-  pages = {136--148},
-  year = {1983}
-}
-"""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -130,7 +72,7 @@ class DOP853(SciPyMethod):
     """
 
     solver = "DOP853"
-    citation = SCIPY + HAIRER_I
+    citation = cite("Virtanen2020", "HairerNorsettWanner1993")
     family = "runge-kutta"
 
     order = 8
@@ -163,7 +105,7 @@ class Radau(SciPyMethod):
 
     solver = "Radau"
     implicit = True
-    citation = SCIPY + HAIRER_II
+    citation = cite("Virtanen2020", "HairerWanner1996")
     family = "runge-kutta"
 
     order = 5
@@ -195,7 +137,7 @@ class BDF(SciPyMethod):
 
     solver = "BDF"
     implicit = multistep = True
-    citation = SCIPY + SHAMPINE
+    citation = cite("Virtanen2020", "ShampineReichelt1997")
     family = "multistep"
 
 
@@ -224,5 +166,5 @@ class LSODA(SciPyMethod):
 
     solver = "LSODA"
     implicit = multistep = True
-    citation = SCIPY + PETZOLD
+    citation = cite("Virtanen2020", "Petzold1983")
     family = "multistep"
