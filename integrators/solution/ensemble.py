@@ -38,7 +38,7 @@ from integrators.solution.plain import (
     unpacked,
     unpacked_method,
 )
-from integrators.solution.record import Solution
+from integrators.solution.record import Solution, States
 from integrators.solution.segments import Segments
 from problems.analysis import deviations, invariants
 from problems.checks import File, checked_arguments, readable
@@ -50,7 +50,7 @@ KIND = "ensemble"  # of files
 
 @readable
 @dataclass(frozen=True, eq=False, repr=False)
-class Solutions(Trajectories):
+class Solutions(States, Trajectories):
     """Many trajectories of a problem; see `Trajectories` for ``t``, ``y``, ``status`` and the rest.
 
     ``solutions[i]`` is trajectory i as a `Solution`; iteration is supported. A slice, an array of booleans or
@@ -186,18 +186,6 @@ class Solutions(Trajectories):
         return np.broadcast_to(self.t, self.y.shape[:2])
 
     @property
-    def q(self) -> Array | None:
-        """Positions (n, m, dof), a view of ``y``; ``None`` for systems that have no positions and momenta."""
-        dof = self.problem.system.dof
-        return None if dof is None else self.y[:, :, :dof]
-
-    @property
-    def p(self) -> Array | None:
-        """Momenta (n, m, dof), a view of ``y``; ``None`` as for ``q``."""
-        dof = self.problem.system.dof
-        return None if dof is None else self.y[:, :, dof:]
-
-    @property
     def arrived(self) -> Any:
         """Which trajectories reached the last time: a boolean array of length n."""
         return np.array([status is Status.FINISHED for status in self.status])
@@ -328,8 +316,7 @@ class Solutions(Trajectories):
         there = ~np.isnan(self.y).any(axis=2)
         number = np.broadcast_to(np.arange(len(self))[:, np.newaxis], there.shape)
         index = pandas.MultiIndex.from_arrays([number[there], self._times[there]], names=["trajectory", "t"])
-        names = [f"{x}{i}" for x, part in self._parts().items() for i in range(part.shape[2])]
-        frame = pandas.DataFrame(self.y[there], index=index, columns=names)
+        frame = pandas.DataFrame(self.y[there], index=index, columns=self._columns())
         frame.attrs = self._about()
         return frame
 
@@ -346,12 +333,6 @@ class Solutions(Trajectories):
         parts["status"] = ("trajectory", [str(status) for status in self.status])
         along = ("time",) if self.t.ndim == 1 else ("trajectory", "time")
         return xarray.Dataset(parts, coords={"t": (along, self.t)}, attrs=self._about())
-
-    def _parts(self) -> dict[str, Array]:
-        return {"y": self.y} if self.q is None or self.p is None else {"q": self.q, "p": self.p}
-
-    def _about(self) -> dict[str, str]:
-        return {"problem": repr(self.problem), "method": repr(self.method)}
 
     @checked_arguments
     def save(self, path: File) -> None:

@@ -34,9 +34,38 @@ from problems.problem import Problem
 from problems.quantities import plain_numbers
 
 
+class States:
+    """What one trajectory and many have in common: ``y``, whose last axis is that of the components."""
+
+    y: Array
+    problem: Problem
+    method: MethodBase
+
+    @property
+    def q(self) -> Array | None:
+        """Positions (..., dof), a view of ``y``; ``None`` for systems that have no positions and momenta."""
+        dof = self.problem.system.dof
+        return None if dof is None else self.y[..., :dof]
+
+    @property
+    def p(self) -> Array | None:
+        """Momenta (..., dof), a view of ``y``; ``None`` as for ``q``."""
+        dof = self.problem.system.dof
+        return None if dof is None else self.y[..., dof:]
+
+    def _parts(self) -> dict[str, Array]:
+        return {"y": self.y} if self.q is None or self.p is None else {"q": self.q, "p": self.p}
+
+    def _columns(self) -> list[str]:
+        return [f"{x}{i}" for x, part in self._parts().items() for i in range(part.shape[-1])]
+
+    def _about(self) -> dict[str, str]:
+        return {"problem": repr(self.problem), "method": repr(self.method)}
+
+
 @readable
 @dataclass(frozen=True, eq=False, repr=False)
-class Solution:
+class Solution(States):
     """A trajectory and the work it took; ``print`` shows a summary.
 
     Call it with times to evaluate it there: `__call__`. It can be pickled, with any problem; `save` and
@@ -214,18 +243,6 @@ class Solution:
 
     def __getstate__(self) -> dict[str, Any]:
         return {key: value for key, value in vars(self).items() if key != "_interpolant"}
-
-    @property
-    def q(self) -> Array | None:
-        """Positions (n, dof), a view of ``y``; ``None`` for systems that have no positions and momenta."""
-        dof = self.problem.system.dof
-        return None if dof is None else self.y[:, :dof]
-
-    @property
-    def p(self) -> Array | None:
-        """Momenta (n, dof), a view of ``y``; ``None`` as for ``q``."""
-        dof = self.problem.system.dof
-        return None if dof is None else self.y[:, dof:]
 
     @property
     def v(self) -> Array | None:
@@ -408,8 +425,7 @@ class Solution:
             If pandas is not installed.
         """
         pandas = library("pandas")
-        names = [f"{x}{i}" for x, part in self._parts().items() for i in range(part.shape[1])]
-        frame = pandas.DataFrame(self.y, index=pandas.Index(self.t, name="t"), columns=names)
+        frame = pandas.DataFrame(self.y, index=pandas.Index(self.t, name="t"), columns=self._columns())
         frame.attrs = self._about()
         return frame
 
@@ -425,11 +441,8 @@ class Solution:
         parts = {name: (("t", "i"), part) for name, part in self._parts().items()}
         return xarray.Dataset(parts, coords={"t": self.t}, attrs=self._about())
 
-    def _parts(self) -> dict[str, Array]:
-        return {"y": self.y} if self.q is None or self.p is None else {"q": self.q, "p": self.p}
-
     def _about(self) -> dict[str, str]:
-        return {"problem": repr(self.problem), "method": repr(self.method), "status": str(self.status)}
+        return {**super()._about(), "status": str(self.status)}
 
     @checked_arguments
     def save(self, path: File) -> None:

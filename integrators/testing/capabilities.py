@@ -79,10 +79,8 @@ def samplings_are_as_stated(method: MethodBase, problem: Problem) -> str | None:
             lambda s=sample: start(method, problem).advance(grid, sample=s),
             f"sample={sample!r}, which is not stated, is refused",
         )
-    plain, first = (
-        start(method, problem).advance(grid),
-        start(method, problem).advance(grid, sample=stated[0]),
-    )
+    plain = start(method, problem).advance(grid)
+    first = start(method, problem).advance(grid, sample=stated[0])
     require(np.array_equal(plain.y, first.y), f"sample={stated[0]!r}, stated first, is the default")
     return None
 

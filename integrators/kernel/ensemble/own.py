@@ -95,14 +95,10 @@ def set_attempt(group, lane):
     group.begin[lane] = 0.0 if ctx.controller.rejected else 1.0
     group.before[lane] = group.iterations[lane]
     group.alive[lane] = 1.0
-    group.previous_length[lane], group.length_limit[lane] = (
-        ctx.controller.previous_length,
-        ctx.controller.length_limit,
-    )
-    group.previous_error[lane], group.previous_quadrature_error[lane] = (
-        ctx.controller.previous_error,
-        ctx.controller.previous_quadrature_error,
-    )
+    group.previous_length[lane] = ctx.controller.previous_length
+    group.length_limit[lane] = ctx.controller.length_limit
+    group.previous_error[lane] = ctx.controller.previous_error
+    group.previous_quadrature_error[lane] = ctx.controller.previous_quadrature_error
     group.stop[lane] = ctx.controller.stop
     suspect = ctx.controller.attempts > 0 or is_near_discontinuity(ctx, h)
     first = ctx.controller.previous_length == 0.0 or h != ctx.controller.next_length
@@ -133,10 +129,8 @@ def catch_up(group, lane, ctx):
     ctx.t0, ctx.time_low = group.t0[lane], group.time_low[lane]
     controller.next_length = group.h[lane]
     ctx.length = controller.previous_length = group.previous_length[lane]
-    controller.previous_error, controller.previous_quadrature_error = (
-        group.previous_error[lane],
-        group.previous_quadrature_error[lane],
-    )
+    controller.previous_error = group.previous_error[lane]
+    controller.previous_quadrature_error = group.previous_quadrature_error[lane]
     controller.length_limit = group.length_limit[lane]
     ctx.counters.steps += int(group.since[lane])
     ctx.implicit.slow = 0
@@ -224,21 +218,15 @@ def has_stalled(group, lane, ctx):
 def set_tolerances(group, ctx):
     """Let a group know what its steps are judged by."""
     controller, estimate, discontinuities = ctx.controller, ctx.estimate, ctx.discontinuities
-    group.allowed_error, group.allowed_quadrature_error = (
-        controller.allowed_error,
-        controller.allowed_quadrature_error,
-    )
-    group.error_power, group.quadrature_error_power = (
-        error_power(controller.error_degree),
-        error_power(ctx.k - 1),
-    )
+    group.allowed_error = controller.allowed_error
+    group.allowed_quadrature_error = controller.allowed_quadrature_error
+    group.error_power = error_power(controller.error_degree)
+    group.quadrature_error_power = error_power(ctx.k - 1)
     group.error_aim, group.quadrature_error_aim = controller.error_aim, controller.quadrature_error_aim
     group.error_decay, group.quadrature_error_decay = estimate.error_decay, estimate.quadrature_error_decay
-    group.least_slope, group.doubt, group.target_iterations = (
-        estimate.least_slope,
-        discontinuities.doubt,
-        TARGET_ITERATIONS,
-    )
+    group.least_slope = estimate.least_slope
+    group.doubt = discontinuities.doubt
+    group.target_iterations = TARGET_ITERATIONS
     group.negligible = discontinuities.negligible if discontinuities.doubt < INFINITY else INFINITY
     group.outermost = ctx.tables.nodes[0]
     group.longest = controller.longest

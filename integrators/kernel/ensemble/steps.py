@@ -148,11 +148,8 @@ def steps(lanes: int, few: int) -> Any:
     def begin(form, group, first, h, factor):
         """Set what stages have besides the state and the values; return the time of the step."""
         k, rows, second, varying = form.k, form.rows, form.second, form.varying
-        error, velocity, base = (
-            part(group.error, first),
-            part(group.velocity, first),
-            part(group.base, first),
-        )
+        error, velocity = part(group.error, first), part(group.velocity, first)
+        base = part(group.base, first)
         for d in range(rows):
             lacks = error[d]
             if second:
@@ -226,11 +223,8 @@ def steps(lanes: int, few: int) -> Any:
     ):
         """Set new values at all stages, one after another, and how much they have changed."""
         k, rows, unit, unrolled = form.k, form.rows, form.unit, form.unrolled
-        base, state, matrix = (
-            as_rows(group.base, lanes),
-            as_rows(group.state, lanes),
-            load_anew(group, "matrix"),
-        )
+        base, state = as_rows(group.base, lanes), as_rows(group.state, lanes)
+        matrix = load_anew(group, "matrix")
         for d in range(rows):
             moved[d] = 0.0
         for i in range(k):

@@ -101,10 +101,8 @@ def watch_ordinary(group, lane):
     controller.next_length, controller.length_after = ctx.h, group.h[lane]
     controller.length_limit = group.length_limit[lane]
     estimate(ctx)  # which notes what is known of the field at both ends
-    discontinuities.boundary, discontinuities.next_boundary = (
-        NOTHING,
-        EXTRAPOLATED if discontinuities.doubt < INFINITY else NOTHING,
-    )
+    discontinuities.boundary = NOTHING
+    discontinuities.next_boundary = EXTRAPOLATED if discontinuities.doubt < INFINITY else NOTHING
     end_step(group, lane, ctx, outcome)
     return False
 

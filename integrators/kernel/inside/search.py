@@ -180,10 +180,8 @@ class KernelSearch:
             error = self._error
             raise UserError(error) from error
         self._context.events.code, self._context.events.memory = look, memory
-        self._context.events.act, self._context.events.acted = (
-            int(bool(sought.actions)),
-            -memory.sign * np.inf,
-        )
+        self._context.events.act = int(bool(sought.actions))
+        self._context.events.acted = -memory.sign * np.inf
 
     def _make_room(self, room: int) -> None:
         self._log = Log.of(self._memory, room)

@@ -60,7 +60,9 @@ class _LineIntegral(dx.AbstractImplicitSolver[_Carried], dx.AbstractAdaptiveSolv
 
     k: eqx.AbstractVar[int]
     s: eqx.AbstractVar[int]
-    linear_solver: eqx.AbstractVar[lx.AbstractLinearSolver | None]
+    root_finder: optx.AbstractRootFinder = eqx.field(default_factory=FixedPoint, kw_only=True)  # pyright: ignore[reportIncompatibleVariableOverride]
+    root_find_max_steps: int = eqx.field(default=400, static=True, kw_only=True)  # pyright: ignore[reportIncompatibleVariableOverride]
+    linear_solver: lx.AbstractLinearSolver | None = eqx.field(default=None, kw_only=True)
 
     term_structure: ClassVar = dx.AbstractTerm
     interpolation_cls: ClassVar[Callable[..., LegendreInterpolation]] = LegendreInterpolation
@@ -204,9 +206,6 @@ class HBVM(_LineIntegral):
 
     k: int = _count("k")
     s: int = _count("s")
-    root_finder: optx.AbstractRootFinder = eqx.field(default_factory=FixedPoint, kw_only=True)  # pyright: ignore[reportIncompatibleVariableOverride]
-    root_find_max_steps: int = eqx.field(default=400, static=True, kw_only=True)  # pyright: ignore[reportIncompatibleVariableOverride]
-    linear_solver: lx.AbstractLinearSolver | None = eqx.field(default=None, kw_only=True)
 
     def __check_init__(self) -> None:
         if self.k < self.s:
@@ -228,9 +227,6 @@ class Gauss(_LineIntegral):
     """
 
     s: int = _count("s")
-    root_finder: optx.AbstractRootFinder = eqx.field(default_factory=FixedPoint, kw_only=True)  # pyright: ignore[reportIncompatibleVariableOverride]
-    root_find_max_steps: int = eqx.field(default=400, static=True, kw_only=True)  # pyright: ignore[reportIncompatibleVariableOverride]
-    linear_solver: lx.AbstractLinearSolver | None = eqx.field(default=None, kw_only=True)
 
     @property
     def k(self) -> int:  # pyright: ignore[reportIncompatibleVariableOverride]

@@ -233,12 +233,10 @@ def _register() -> None:
     descriptor = rebound.binarydata_field_descriptor.BinarydataFieldDescriptor
     fields = (descriptor * (len(FIELDS) + 1))()
     for field, (text, kind, name, offset, count) in zip(fields, FIELDS, strict=False):
-        field.documentation, field.dtype, field.name, field.offset = (
-            text.encode(),
-            kind,
-            name.encode(),
-            8 * offset,
-        )
+        field.documentation = text.encode()
+        field.dtype = kind
+        field.name = name.encode()
+        field.offset = 8 * offset
         if count is not None:
             field.offset_N, field.element_size = 8 * count, 8
     create = ctypes.CFUNCTYPE(ctypes.c_void_p)(_create)

@@ -203,12 +203,10 @@ def iterate(simulation, state, table, t, h, q, v, rest, forces, work):
     """Iterate until the stages are solved, the block NEW being first values; return whether they are."""
     k = forces.shape[0]
     number, clock = words(state, at.WORDS), reals(simulation, at.SIMULATION)
-    base, new, old, fast = (
-        block(work, BASE, k),
-        block(work, NEW, k),
-        block(work, OLD, k),
-        block(work, FAST, k),
-    )
+    base = block(work, BASE, k)
+    new = block(work, NEW, k)
+    old = block(work, OLD, k)
+    fast = block(work, FAST, k)
     flags = small(simulation, 2 * at.SIMULATION)
     megno = flags[at.CALCULATE_MEGNO] != 0
     depends = megno or flags[at.VELOCITY_DEPENDENT] != 0
