@@ -217,10 +217,21 @@ class Batches(Protocol):
     def batch(
         self, Y0: ArrayLike, par: ArrayLike | None = None, *, times: ArrayLike, t0: float = 0.0
     ) -> Trajectories:
-        """Integrate from ``Y0`` (n, dim) with parameters (n, n_par), from ``t0`` to the same times (m,).
+        """Integrate many starts to the same times.
 
         Each result is independent of the others. A trajectory that fails has its status, reason and time, and
         does not affect the others.
+
+        Parameters
+        ----------
+        Y0 : array_like, shape (n, dim)
+            Starts.
+        par : array_like, shape (n_par,) or (n, n_par), optional
+            Parameters, for all or for each; the system's own by default.
+        times : array_like, shape (m,)
+            Times asked for, strictly monotone from ``t0``.
+        t0 : float
+            Time of the starts.
         """
         ...
 

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from time import perf_counter
-from typing import Any, cast
+from typing import Any
 
 import diffrax as dx
 import jax
@@ -276,25 +276,14 @@ def _fixed(terms: Any, solver: Any, dim: int, n_par: int, split: bool) -> Solve:
         return solver.init(terms, tau, tau, parts(y), par)
 
     def run(base: Any, h: Any, n0: Any, n1: Any, y: Any, state: Any, par: Any) -> Any:
-        solution = dx.diffeqsolve(
-            terms,
-            solver,
-            base + n0 * h,
-            base + n1 * h,
-            h,
-            parts(y),
-            args=par,
-            saveat=dx.SaveAt(t1=True, solver_state=True),
-            stepsize_controller=Multiples(base, h, n0),
-            adjoint=dx.ForwardMode(),
-            max_steps=None,
-            throw=False,
-            solver_state=state,
-        )
+        solution = _solved(
+            terms, solver, base + n0 * h, base + n1 * h, h, parts(y), par, Multiples(base, h, n0),
+            saveat=dx.SaveAt(t1=True, solver_state=True), solver_state=state,
+        )  # fmt: skip
         return whole(jax.tree.map(lambda x: x[-1], solution.ys)), solution.solver_state
 
     def plain(tau: Any, end: Any, h: Any, y: Any, par: Any) -> Any:
-        return _plainly(terms, solver, tau, end, h, parts(y), par, dx.ConstantStepSize(), whole, None)
+        return _plainly(whole, terms, solver, tau, end, h, parts(y), par, dx.ConstantStepSize())
 
     tau, y, par, n = np.float64(0.0), np.zeros(dim), np.zeros(n_par), np.int64(0)
     unity = np.float64(1.0)
@@ -304,14 +293,20 @@ def _fixed(terms: Any, solver: Any, dim: int, n_par: int, split: bool) -> Solve:
     return Solve(first, last, lambda: _compile_plain(plain, tau, tau, unity, y, par), many)
 
 
-def _plainly(
-    terms: Any, solver: Any, tau: Any, end: Any, dt: Any, y: Any, par: Any, controller: Any, whole: Any,
-    most: int | None,
+def _solved(
+    terms: Any, solver: Any, tau: Any, end: Any, dt: Any, y: Any, par: Any, controller: Any,
+    most: int | None = None, **more: Any,
 ) -> Any:  # fmt: skip
-    solution = dx.diffeqsolve(
+    """Return the solution of a solve that is not differentiated, and raises nothing."""
+    return dx.diffeqsolve(
         terms, solver, tau, end, dt, y, args=par, stepsize_controller=controller,
-        max_steps=most, adjoint=dx.ForwardMode(), throw=False,
+        max_steps=most, adjoint=dx.ForwardMode(), throw=False, **more,
     )  # fmt: skip
+
+
+def _plainly(whole: Any, *solve: Any) -> Any:
+    """Return where a solve ended, and its counts; ``solve`` are the arguments of `_solved`."""
+    solution = _solved(*solve)
     stats = solution.stats
     return (
         whole(jax.tree.map(lambda x: x[-1], solution.ys)),
@@ -340,23 +335,12 @@ def _adaptive(terms: Any, solver: Any, dim: int, n_par: int, split: bool) -> Sol
     def run(tau: Any, end: Any, dt: Any, y: Any, state: Any, control: Any, limit: Any, *rest: Any) -> Any:
         par, rtol, atol = rest
         inner, _, _ = control
-        solution = dx.diffeqsolve(
-            terms,
-            solver,
-            tau,
-            end,
-            dt,
-            y,
-            args=par,
+        solution = _solved(
+            terms, solver, tau, end, dt, y, par, controller(limit, rtol, atol),
             saveat=dx.SaveAt(t1=True, solver_state=True, controller_state=True),
-            stepsize_controller=controller(limit, rtol, atol),
-            adjoint=dx.ForwardMode(),
-            max_steps=None,
-            throw=False,
-            solver_state=state,
-            controller_state=(inner, dt, jnp.asarray(0)),
-        )
-        after = cast(Any, solution.controller_state)
+            solver_state=state, controller_state=(inner, dt, jnp.asarray(0)),
+        )  # fmt: skip
+        after = solution.controller_state
         code = jnp.asarray(OTHER)
         for result, value in (
             (dx.RESULTS.successful, OK),
@@ -365,8 +349,8 @@ def _adaptive(terms: Any, solver: Any, dim: int, n_par: int, split: bool) -> Sol
         ):
             code = jnp.where(solution.result == result, value, code)
         return (
-            solution.ys[-1],  # pyright: ignore[reportOptionalSubscript, reportIndexIssue]
-            solution.ts[-1],  # pyright: ignore[reportOptionalSubscript]
+            solution.ys[-1],
+            solution.ts[-1],
             solution.solver_state,
             after,
             after[1],
@@ -377,7 +361,7 @@ def _adaptive(terms: Any, solver: Any, dim: int, n_par: int, split: bool) -> Sol
 
     def plain(tau: Any, end: Any, y: Any, par: Any, rtol: Any, atol: Any) -> Any:
         control = dx.PIDController(rtol=rtol, atol=atol)
-        return _plainly(terms, solver, tau, end, FIRST_STEP, y, par, control, lambda y: y, MOST_STEPS)
+        return _plainly(lambda y: y, terms, solver, tau, end, FIRST_STEP, y, par, control, MOST_STEPS)
 
     unity, y, par = np.float64(1.0), np.zeros(dim), np.zeros(n_par)
     first = _compile(begin, unity, y, par, unity, unity)

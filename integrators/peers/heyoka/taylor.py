@@ -188,29 +188,12 @@ class TaylorProgram(ProgramBase):
         return start
 
     def batch(
-        self,
-        Y0: ArrayLike,
-        par: ArrayLike | None = None,
-        *,
-        times: ArrayLike,
-        t0: float = 0.0,
+        self, Y0: ArrayLike, par: ArrayLike | None = None, *, times: ArrayLike, t0: float = 0.0
     ) -> Trajectories:
         """Integrate many initial conditions to the same times by heyoka's batch integrator.
 
         It is compiled when this is first called. Every lane has steps of its own; the
-        last one to each time is shortened onto it. A trajectory that fails or stalls has its
-        status, time and reason, and leaves the others alone.
-
-        Parameters
-        ----------
-        Y0 : array_like, shape (n, dim)
-            Starts.
-        par : array_like, shape (n_par,) or (n, n_par), optional
-            Parameters, for all or for each; the system's own by default.
-        times : array_like, shape (m,)
-            Times asked for, strictly monotone from ``t0``.
-        t0 : float
-            Time of the starts.
+        last one to each time is shortened onto it. See `integrators.protocol.Batches` for the rest.
         """
         return self.prepare_batch(Y0, par, times=times, t0=t0)()
 

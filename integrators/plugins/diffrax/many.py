@@ -81,19 +81,7 @@ class JaxProgram:
     def batch(
         self, Y0: ArrayLike, par: ArrayLike | None = None, *, times: ArrayLike, t0: float = 0.0
     ) -> Trajectories:
-        """Integrate every start to all times; see `integrators.protocol.Trajectories`.
-
-        Parameters
-        ----------
-        Y0 : array_like, shape (n, dim)
-            Starts.
-        par : array_like, shape (n_par,) or (n, n_par), optional
-            Parameters, for all or for each; the system's own by default.
-        times : array_like, shape (m,)
-            Times asked for, strictly monotone from ``t0``.
-        t0 : float
-            Time of the starts.
-        """
+        """Integrate every start to all times; see `integrators.protocol.Batches`."""
         grid = check_times(times, t0)
         starts, parameters = check_batch(Y0, par, grid, self.system)
         h = -self.h if grid[-1] < t0 else self.h
