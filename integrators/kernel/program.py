@@ -110,6 +110,7 @@ class HBVMProgram(Compiled):
             self._fixed["raw_matrix"] = tables.rounded(self.constants)
         self.adaptive = self._adaptive()
         self._fresh: tuple[bytes, Context, Context] | None = None
+        self._over: list[tuple[Context, Context]] = []
         self.vectors: dict[tuple[int, bool], Context] = {}
         """Contexts of tangent vectors, by their number and whether they move parameters, to be copied."""
         parts = [self.field, kernel, self.fused, *(self.kept.code if self.kept else ())]
@@ -353,7 +354,10 @@ class HBVMProgram(Compiled):
         return tables.scaled(self.constants, h, squared=self.second and self.shape.unit)
 
     def contexts(self, par: Array) -> tuple[Context, Context]:
-        """Return fresh memory for a trajectory with these parameters, and for its partial steps."""
+        """Return memory for a trajectory with these parameters, and for its partial steps.
+
+        It is that of a trajectory that is over, if there is one; see `give_back`.
+        """
         key, fresh = par.tobytes(), self._fresh  # read once: another thread may replace it
         if fresh is None or fresh[0] != key:
             own, partial = (
@@ -363,10 +367,21 @@ class HBVMProgram(Compiled):
             )
             self.renew(own, partial, par)
             self._fresh = fresh = key, own, partial
-        own, partial = fresh[1].copy(), fresh[2].copy()
+        try:
+            own, partial = self._over.pop()
+        except IndexError:
+            own, partial = fresh[1].copy(), fresh[2].copy()
+        else:
+            own.become(fresh[1])
+            partial.become(fresh[2])
         if self.kept:
             self.kept.share(own, partial)
         return own, partial
+
+    def give_back(self, own: Context, partial: Context) -> None:
+        """Take the memory of a trajectory that is over, for the next one; that of one is enough."""
+        if not self._over:
+            self._over.append((own, partial))
 
     def _new_context(self, *, partial: bool) -> Context:
         """Return fresh memory, without parameters."""

@@ -85,11 +85,11 @@ class Pointed(dict[int, Any]):
         if self.calls_back or getattr(owner, "calls_back", False) or getattr(before, "calls_back", False):
             self.calls_back = any(getattr(each, "calls_back", False) for each in self.values())
 
-    def copy(self) -> "Pointed":
-        """Hold what this holds."""
-        other = Pointed(self)
-        other.calls_back = self.calls_back
-        return other
+    def become(self, other: "Pointed") -> None:
+        """Hold what another holds."""
+        self.clear()
+        self.update(other)
+        self.calls_back = other.calls_back
 
 
 class Slot:
@@ -425,11 +425,17 @@ class Memory(_Slots):
         """Return memory of its own with the same content, which points to the same arrays."""
         other = object.__new__(type(self))
         vars(other).update({k: v for k, v in vars(self).items() if k not in self.part_of})
-        other.pointed = self.pointed.copy()
+        other.pointed = Pointed()
         other._lies_in(_from_a_line_on(np.empty(self._memory.size + LINE)))
-        other._memory[:] = self._memory
-        other.words[self._indices] += other.address - self.address
+        other.become(self)
         return other
+
+    def become(self, other: Self) -> None:
+        """Take the content of another of the same shape, and point to the same arrays."""
+        self._memory[:] = other._memory
+        self._own, self._indices = other._own, other._indices
+        self.words[self._indices] += self.address - other.address
+        self.pointed.become(other.pointed)
 
     def lasting(self) -> tuple[dict[str, int], dict[str, NDArray[Any]]]:
         """Return copies of what later steps depend on, by the names of the slots: words, and arrays."""

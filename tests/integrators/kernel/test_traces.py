@@ -68,6 +68,26 @@ def test_what_was_integrated_before_leaves_no_trace(method, others, last, sample
     assert bits(integrate(last, method, sample=sample)) == alone
 
 
+def test_a_trajectory_takes_the_memory_of_one_that_is_over():
+    made: Any = HBVM().compile(KEPLER.system)
+    first, second = (made.start(KEPLER.y0) for _ in range(2))
+    place = first._context.address
+    del first
+    third, fourth = (made.start(KEPLER.y0) for _ in range(2))
+    assert third._context.address == place
+    assert len({place, second._context.address, fourth._context.address}) == 3
+
+
+def test_a_search_for_events_keeps_its_memory():
+    made: Any = HBVM().compile(KEPLER.system)
+    stepper = made.with_events(KEPLER, named(Event(lambda q: q[1])))(KEPLER.y0, KEPLER.par, 0.0, 10.0)
+    stepper.advance([10.0])
+    place, search = stepper._context.address, stepper.search
+    del stepper
+    assert made.start(KEPLER.y0)._context.address != place
+    assert search.hits.counts[0] > 0
+
+
 @pytest.mark.parametrize("method", [HBVM(), HBVM(k=8, s=4, h=0.05)], ids=repr)
 @pytest.mark.parametrize("then", [None, lambda q, p: [q[0], q[1], -p[0], -p[1]]], ids=["looks", "acts"])
 def test_what_was_searched_before_leaves_no_trace(method, then):
