@@ -97,13 +97,7 @@ class Campaign(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         ]
 
     def cases(self) -> list["Case"]:
-        """Return the cases, problem by problem, in the order of the file; the ensembles' last.
-
-        Raises
-        ------
-        problems.errors.InputError
-            If a placeholder has no value, or a value no placeholder; for too many cases.
-        """
+        """Return the cases, problem by problem, in the order of the file; the ensembles' last."""
         limits.check(f"campaign {self.name!r}", "CASES", self._count(), "give fewer values to its sweeps")
         cases = [
             Case(
@@ -157,13 +151,7 @@ def text_of(entry: ProblemEntry) -> str:
 
 
 def chosen(entry: ProblemEntry) -> list[dict[str, Scalar]]:
-    """Return the values of an entry, one dictionary for every combination of its sweep.
-
-    Raises
-    ------
-    problems.errors.InputError
-        For a value that no placeholder takes.
-    """
+    """Return the values of an entry, one dictionary for every combination of its sweep."""
     _all_used(entry.use, entry.sweep)
     return [entry.values | values for values in combinations(entry.sweep)]
 

@@ -21,11 +21,6 @@ def report_on(
     ``study`` is the folder with the blocks that a campaign has of its own; see `gather`.
 
     Where its campaign has results of several kinds of processor side by side, those that lie there stay.
-
-    Raises
-    ------
-    problems.errors.InputError
-        If a store holds no finished case, or the directory cannot be written.
     """
     if len(stores) == 1 and stores[0].index().campaign.page.by_processor:
         stores = joined(stores[0], directory / PACKED)

@@ -27,14 +27,11 @@ class Memory:
         What it holds now, and the most that it has held.
     swapped : int
         What was moved to the disk.
-    files : int
-        Resident pages of files: libraries, for the most part.
     """
 
     resident: int = 0
     peak: int = 0
     swapped: int = 0
-    files: int = 0
 
 
 def of_process(pid: int) -> Memory:
@@ -45,7 +42,7 @@ def of_process(pid: int) -> Memory:
         return _elsewhere(pid)
     words = (line.split() for line in status.splitlines() if line.endswith(" kB"))
     sizes = {name: int(size) for name, size, _ in words}
-    names = ("VmRSS:", "VmHWM:", "VmSwap:", "RssFile:")
+    names = ("VmRSS:", "VmHWM:", "VmSwap:")
     return Memory(*(sizes.get(name, 0) for name in names))
 
 

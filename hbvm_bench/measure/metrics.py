@@ -158,17 +158,6 @@ def energy_bias(m: Measured) -> float | str:
     return abs(growth.mean) / (drift.limit(growth.starts) * growth.mean_error)
 
 
-@metric("smallest energy drift within the interval", "smallest drift", "1/time", same_trajectory=True)
-def energy_rate_least(m: Measured) -> float | str:
-    """The drift nearest to 0 in the 95 % interval over several initial conditions; 0 if that
-    contains 0.
-    """
-    growth = m.growth.get("energy")
-    if growth is None or growth.rate_low is None or growth.rate_high is None:
-        return "an interval needs several initial conditions"
-    return max(growth.rate_low, -growth.rate_high, 0.0)
-
-
 @metric("time-reversal error", "reversal", "length", same_trajectory=True)
 def reversal(m: Measured) -> float | str:
     """Time-reversal error: distance from the initial state after integrating forwards and back over part of
@@ -325,18 +314,6 @@ def compile_seconds(m: Measured) -> float | str:
     return "nothing is compiled at run time" if compiled.cached is None else compiled.seconds
 
 
-@metric("compile time, cold", "cold", "s", whole_interval=False)
-def compile_cold(m: Measured) -> float | str:
-    """Seconds of compilation with an empty cache."""
-    return _compiled(m, cached=False, otherwise="compiled code was in the cache already")
-
-
-@metric("compile time, cached", "cached", "s", whole_interval=False)
-def compile_cached(m: Measured) -> float | str:
-    """Seconds to load compiled code from the library's cache."""
-    return _compiled(m, cached=True, otherwise="compiled code was not in a cache")
-
-
 @metric("peak memory", "memory", "MiB", whole_interval=False)
 def peak_memory(m: Measured) -> float | str:
     """Largest resident memory of the process that took the samples, libraries included."""
@@ -362,18 +339,6 @@ def _of_growth(m: Measured, name: str) -> float | str:
         return "no error growth was fitted"
     number = getattr(growth, name)
     return growth.why or "the samples do not determine it" if number is None else number
-
-
-def _compiled(m: Measured, *, cached: bool, otherwise: str) -> float | str:
-    """Return the median seconds of the compilations of a kind; ``otherwise`` where there are only others."""
-    rounds = m.timing.rounds if m.timing is not None else []
-    compiles = [compile_ for compile_ in (m.compile, *(r.compile for r in rounds)) if compile_ is not None]
-    if not compiles:
-        return LOADED
-    if all(compile_.cached is None for compile_ in compiles):
-        return "nothing is compiled at run time"
-    seconds = sorted(compile_.seconds for compile_ in compiles if compile_.cached is cached)
-    return seconds[(len(seconds) - 1) // 2] if seconds else otherwise
 
 
 def _largest(values: NDArray[np.float64], t: NDArray[np.float64]) -> float | str:

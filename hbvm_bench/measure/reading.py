@@ -23,13 +23,7 @@ from problems.errors import InputError
 
 
 def records(store: Store) -> list[Record]:
-    """Return the records of a run as `Store.records` does, with their readings.
-
-    Raises
-    ------
-    problems.errors.InputError
-        If the directory holds no run.
-    """
+    """Return the records of a run as `Store.records` does, with their readings."""
     known = store.known()
     return [up_to_date(store, record, known) for record in store.records()]
 

@@ -178,11 +178,6 @@ class Document:
         return [block for block in self.walk() if isinstance(block, Picture)]
 
     @property
-    def words(self) -> int:
-        """How many words are read before anything is unfolded."""
-        return sum(map(_words, [self.title, *self.lead, *self.blocks]))
-
-    @property
     def failed(self) -> list[Failed]:
         """What could not be made."""
         return [block for block in self.walk() if isinstance(block, Failed)]
@@ -217,33 +212,3 @@ def pieces(text: object) -> list[tuple[str, bool]]:
 def is_call(text: str) -> bool:
     """Whether a cell of a table is the call of a method or of a problem, which is set as code."""
     return re.fullmatch(r"[A-Za-z_]\w*\(.*\)", text) is not None
-
-
-def _words(block: Block) -> int:
-    """Return how many words of a block are read before anything in it is unfolded."""
-    match block:
-        case str():
-            return len(block.split())
-        case Details():
-            return len(block.summary.split())
-        case Section():
-            return len(block.title.split()) + sum(map(_words, block.blocks))
-        case Table():
-            texts = (block.title, *block.head, block.note, *(cell for row in block.rows for cell in row))
-        case CaseTable():
-            rows = (row for problem in block.problems for _, rows in problem.groups for row in rows)
-            texts = (
-                text
-                for row in rows
-                for text in (row.record.case.method, *(cell.text for cell in row.cells.values()), row.remark)
-            )
-        case Claims():
-            claims = (claim for _, _, claims in block.groups for claim in claims)
-            texts = (text for claim in claims for text in (claim.words, claim.paper, claim.here))
-        case Picture():
-            texts = (block.title, block.caption)
-        case Items():
-            texts = block.items
-        case _:
-            texts = (value for value in vars(block).values() if isinstance(value, str))
-    return sum(len(text.split()) for text in texts)

@@ -32,11 +32,6 @@ def write_pages(directory: Path) -> Iterator[Path]:
     """Draw every report in a directory from its stored rows, and yield the path of its page.
 
     A folder in a report's with results that the report is composed of has a page with all of its rows.
-
-    Raises
-    ------
-    problems.errors.InputError
-        If what is stored is damaged, or a directory cannot be written.
     """
     for folder in sorted({path.parent for name in (PACKED, NAME) for path in directory.glob(f"**/{name}")}):
         if folder != directory:
@@ -78,11 +73,6 @@ def conditions(directory: Path) -> Table:
     """Return the date, the kernel, the processor and the other work of all stored results.
 
     Results of several kinds of processor have a row for each.
-
-    Raises
-    ------
-    problems.errors.InputError
-        If what is stored is damaged.
     """
     rows = []
     for path in sorted(directory.glob(f"**/{PACKED}")):

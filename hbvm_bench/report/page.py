@@ -123,13 +123,7 @@ def beside(place: Path) -> Path | None:
 
 
 def check(study: Path | None) -> None:
-    """Refuse a page that names a block which is not there, before anything is measured.
-
-    Raises
-    ------
-    problems.errors.InputError
-        With the nearest names.
-    """
+    """Refuse a page that names a block which is not there, before anything is measured."""
     for name, results in template.named_blocks(page_file(study)):
         if results is None:
             find(name, study)

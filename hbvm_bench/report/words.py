@@ -24,7 +24,6 @@ from hbvm_bench.summaries.rows import (
 RIGHT = {"position_end": 1e-8, "energy_max": 1e-13}
 """The errors in the summary's question "who is fastest among those that are right?\""""
 BEST = 3  # of them
-SHORTEST_RUN = 1e-6  # seconds; no whole integration takes less
 
 REFERENCE_SUBSET = (
     "The position errors are the largest of {} trajectories, taken evenly from all, whose ends are known in "
@@ -102,8 +101,6 @@ def timing(plan: TimingPlan) -> str:
         visits += f" A setting is timed in the first compilation alone where {front.RULE}, "
         visits += "unless it is its method's fastest at the errors that the problem or a goal asks for."
     sample = f"A sample lasts at least {seconds(plan.shortest)}."
-    if plan.shortest < SHORTEST_RUN:
-        sample = "A sample is one integration."
     return TIMES.format(visits=visits, sample=sample)
 
 

@@ -29,11 +29,6 @@ def write(document: Document, directory: Path, beside: Mapping[str, bytes] | Non
         Where to.
     beside : mapping of str to bytes, optional
         Other files that belong to it, by name.
-
-    Raises
-    ------
-    problems.errors.InputError
-        If the directory cannot be written.
     """
     files = {**(beside or {}), **rendered(document, directory)}
     write_all({directory / name: content for name, content in files.items()})

@@ -27,6 +27,7 @@ from hbvm_bench.campaign.sweep import fill
 from hbvm_bench.measure.measured import PLAIN, PREFIXES
 from hbvm_bench.measure.metrics import find
 from hbvm_bench.reference import solutions
+from hbvm_bench.summaries.goals import TIMES
 from hbvm_bench.summaries.rows import Task, grouped_by
 from problems.errors import InputError, unknown
 from problems.problem import Problem
@@ -35,9 +36,6 @@ LEAST = {"wall_seconds": 0.1, "compile_seconds": 0.1, "memory_gib": 0.1}
 """Under less no case can begin: an interpreter with NumPy alone takes 0.05 GiB."""
 
 SHORTEST = 0.02  # seconds of a sample
-
-TIMES = ("warm_seconds", "throughput")
-"""Metrics that only the timing pass has."""
 
 
 def check(campaign: Campaign, cases: Sequence[Resolved]) -> None:

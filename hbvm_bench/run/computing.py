@@ -20,13 +20,7 @@ from hbvm_bench.store.store import Store
 
 
 def plan(campaign: Campaign, place: Path | None) -> list[Request]:
-    """Return the computations that a campaign names, the long ones first; ``place`` is its file's folder.
-
-    Raises
-    ------
-    problems.errors.InputError
-        If there is no such function beside the campaign's file.
-    """
+    """Return the computations that a campaign names, the long ones first; ``place`` is its file's folder."""
     if not campaign.computes:
         return []
     tasks = folder.named(campaign.computes, place)(campaign.quick)

@@ -115,13 +115,7 @@ class Store:
         return packed if packed.is_file() and not path.is_file() else path
 
     def prepare(self) -> None:
-        """Make the file, or refuse a place that cannot be written.
-
-        Raises
-        ------
-        problems.errors.InputError
-            If nothing can be written there; nothing is left behind.
-        """
+        """Make the file, or refuse a place that cannot be written."""
         ensure_writable(self.directory)
         with self._told():
             if not self.path.is_file():
@@ -428,13 +422,7 @@ def _journal(directory: Path) -> str:
 
 
 def opened(places: Sequence[Path]) -> list[Store]:
-    """Return the runs at some places.
-
-    Raises
-    ------
-    problems.errors.InputError
-        If one of them holds none.
-    """
+    """Return the runs at some places."""
     return [store for place in places for store in Store(place).runs()]
 
 

@@ -65,11 +65,6 @@ def compare(first: Store, second: Store) -> RunComparison:
 
     A case of one run is that of the other if problem, method and sampling are the
     same; sources, versions and machines may differ.
-
-    Raises
-    ------
-    problems.errors.InputError
-        If a directory holds no run.
     """
     first_records, other = _by_case(reading.records(first)), _by_case(reading.records(second))
     both = [(record, other[key]) for key, record in first_records.items() if key in other]

@@ -17,6 +17,7 @@ from hbvm_bench.summaries.standings import SettingComparison
 from hbvm_bench.summaries.table import NONE, Table
 
 TIMES = ("warm_seconds", "throughput")
+"""Metrics that only the timing pass has."""
 
 PLACE = ("position", "phase", "observable_error")
 """With what the metrics begin that say where a run is, not only on which level of energy."""
@@ -52,13 +53,7 @@ class Verdict:
 
 
 def verdicts(campaign: Campaign, records: Sequence[Record]) -> list[Verdict]:
-    """Return the verdict on every goal, problem by problem.
-
-    Raises
-    ------
-    problems.errors.UnknownNameError
-        For a metric that there is not.
-    """
+    """Return the verdict on every goal, problem by problem."""
     return [
         _judged(goal, entry, here)
         for entry, here in standings.entries(campaign, records)

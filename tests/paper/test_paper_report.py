@@ -45,11 +45,6 @@ def test_a_departure_is_the_first_own_step_beyond(falling):
     assert found == 2.25  # q(2) = -2 is not beyond
 
 
-def test_a_departure_is_seen_on_a_grid_where_asked_for(falling):
-    found = departure(falling.start(np.zeros(2)), 100.0, lambda y: y[:, 0] < -2.0, stretch=8.0, every=2.0)
-    assert found == 4.0
-
-
 def test_what_stays_has_no_departure(falling):
     assert departure(falling.start(np.zeros(2)), 3.1, lambda y: y[:, 0] < -50.0, stretch=0.1) is None
 

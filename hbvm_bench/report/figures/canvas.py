@@ -140,26 +140,17 @@ def say(
     axes.annotate(text, at, xytext=offset, textcoords="offset points", **given)  # type: ignore[arg-type]
 
 
-def log_axis(
-    axes: Axes, which: str, low: int, high: int, *, most: int = 7, zero: float | None = None
-) -> None:
-    """Give an axis powers of ten from 10^low to 10^high and at most so many labels; 0 stands at ``zero``.
-
-    It is a decade long at least.
-    """
+def log_axis(axes: Axes, which: str, low: int, high: int, *, most: int = 7) -> None:
+    """Give an axis powers of ten from 10^low to 10^high, a decade at least, and at most so many labels."""
     high = max(high, low + 1)
     stride = max(1, -(-(high - low) // most))
     ticks = [10.0**power for power in range(low, high + 1) if (power - high) % stride == 0]
-    labels = {tick: power_label(tick) for tick in ticks}
-    if zero is not None:
-        labels = {tick: text for tick, text in labels.items() if tick > zero * 10.0 ** (stride / 2)}
-        labels[zero] = "exactly 0"
     axis = axes.xaxis if which == "x" else axes.yaxis
     (axes.set_xscale if which == "x" else axes.set_yscale)("log")
     (axes.set_xlim if which == "x" else axes.set_ylim)(10.0**low, 10.0**high)
-    axis.set_major_locator(FixedLocator(sorted(labels)))
+    axis.set_major_locator(FixedLocator(ticks))
     axis.set_minor_locator(NullLocator())
-    axis.set_major_formatter(FuncFormatter(lambda value, _: labels.get(value, power_label(value))))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: power_label(value)))
 
 
 def power_range(values: Iterable[NDArray[np.float64]], low: int, high: int) -> tuple[int, int]:

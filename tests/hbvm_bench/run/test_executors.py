@@ -28,7 +28,7 @@ from tests.hbvm_bench.conftest import SHORT
 from .cluster import Cluster
 
 LIMITS = Limits(wall_seconds=60, memory_gib=2)
-COST = ("warm_seconds", "compile_seconds", "compile_cold", "compile_cached", "peak_memory")
+COST = ("warm_seconds", "compile_seconds", "peak_memory")
 
 
 def cases(count, wait=0.0):

@@ -13,24 +13,17 @@ GROWTH = 2.0  # of the stretches: short at first, so that an early departure cos
 LONGEST = 4096.0  # stretch, in units of the first
 
 
-def departure(
-    stepper: Stepper, t_end: float, departed: Test, *, stretch: float, every: float | None = None
-) -> float | None:
+def departure(stepper: Stepper, t_end: float, departed: Test, *, stretch: float) -> float | None:
     """Integrate until a state has departed; return the time of the first such state, or ``None``.
 
     A trajectory that its method can follow no farther, as in a blow-up, has departed with its last state.
-    A stretch of time is integrated without looking, the next ones are longer; then states ``every`` so far
-    apart are looked at, by default all steps of the method, which is expensive for some libraries.
+    A stretch of time is integrated without looking, the next ones are longer; then all steps are looked at.
     """
     longest = stretch * LONGEST
     ahead = stepper.t
     while ahead < t_end:
-        start, ahead = ahead, min(ahead + stretch, t_end)
-        if every is None:
-            samples = stepper.advance(np.array([ahead]), sample="steps")
-        else:
-            times = np.linspace(start, ahead, max(2, round((ahead - start) / every) + 1))
-            samples = stepper.advance(times[1:])
+        ahead = min(ahead + stretch, t_end)
+        samples = stepper.advance(np.array([ahead]), sample="steps")
         if samples.t.size and (time := first(samples.t, departed(samples.y))) is not None:
             return time
         if samples.status.failed:

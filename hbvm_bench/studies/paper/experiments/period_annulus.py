@@ -59,24 +59,24 @@ class Edge:
         return error_of(self.c)
 
 
-def edge(method: MethodBase, span: float, *, every: float | None = None, end: float = 1.0) -> Edge:
+def edge(method: MethodBase, span: float, *, end: float = 1.0) -> Edge:
     """Find the edge by the paper's steps 1 to 5, on the segment from the origin to Q = (0, 1).
 
     The printed step 2 lets the segment end in P1; it has to end in Q. With another Q = (0, end) the
-    bisection visits other points. Orbits are followed over the span; for ``every`` see `departure`.
+    bisection visits other points. Orbits are followed over the span.
     """
     program = method.compile(PROBLEM.system)
     low, high = 0.0, end
     while high - low >= TOLERANCE and (middle := (low + high) / 2) not in (low, high):
-        stays = fate(program, middle, span, every) is None
+        stays = fate(program, middle, span) is None
         low, high = (middle, high) if stays else (low, middle)
     return Edge(low, high)
 
 
-def fate(program: Program, c: float, span: float, every: float | None = None) -> float | None:
-    """Return when the numerical orbit from (0, c) departs, or ``None``; see `departure` for ``every``."""
+def fate(program: Program, c: float, span: float) -> float | None:
+    """Return when the numerical orbit from (0, c) departs, or ``None``."""
     stepper = program.start(np.array([0.0, c]), PROBLEM.par)
-    return departure(stepper, span, _departed, stretch=SHORT_SPAN, every=every)
+    return departure(stepper, span, _departed, stretch=SHORT_SPAN)
 
 
 def cell(s: int, h: float) -> dict[str, Edge]:
