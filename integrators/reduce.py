@@ -7,7 +7,6 @@ ignored.
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field
-from functools import partial
 from typing import Annotated, Any, Literal, Protocol
 
 import numpy as np
@@ -90,7 +89,7 @@ class Mean(Reduction):
 
     def begin(self) -> Gathering:
         """Return what gathers the values."""
-        return _Sum() if self.over == "trajectories" else _Rows(partial(np.nanmean, axis=1))
+        return _Sum() if self.over == "trajectories" else _Rows(np.nanmean)
 
 
 @dataclass(frozen=True)
@@ -99,7 +98,7 @@ class Minimum(Reduction):
 
     def begin(self) -> Gathering:
         """Return what gathers the values."""
-        return _Extreme(np.fmin) if self.over == "trajectories" else _Rows(partial(np.nanmin, axis=1))
+        return _Extreme(np.fmin) if self.over == "trajectories" else _Rows(np.nanmin)
 
 
 @dataclass(frozen=True)
@@ -108,7 +107,7 @@ class Maximum(Reduction):
 
     def begin(self) -> Gathering:
         """Return what gathers the values."""
-        return _Extreme(np.fmax) if self.over == "trajectories" else _Rows(partial(np.nanmax, axis=1))
+        return _Extreme(np.fmax) if self.over == "trajectories" else _Rows(np.nanmax)
 
 
 def _increases(edges: Any) -> bool:
@@ -136,7 +135,7 @@ class Histogram(Reduction):
     def begin(self) -> Gathering:
         """Return what gathers the values."""
         edges = np.array(self.edges, dtype=np.float64)
-        return _Counts(edges) if self.over == "trajectories" else _Rows(partial(_counted, edges=edges))
+        return _Counts(edges) if self.over == "trajectories" else _CountedRows(edges)
 
 
 @dataclass
@@ -180,13 +179,25 @@ class _Counts:
 
 @dataclass
 class _Rows:
-    of_rows: Callable[[Array], Array]
+    of_row: Callable[..., Any]
     collected: list[Array] = field(default_factory=list)
 
     def take(self, values: Array) -> None:
         with warnings.catch_warnings():  # that a trajectory reached nothing: its result is NaN
             warnings.simplefilter("ignore", RuntimeWarning)
-            self.collected.append(self.of_rows(values))
+            self.collected.append(self.of_row(values, axis=1))
+
+    def result(self) -> Array:
+        return np.concatenate(self.collected)
+
+
+@dataclass
+class _CountedRows:
+    edges: Array
+    collected: list[Array] = field(default_factory=list)
+
+    def take(self, values: Array) -> None:
+        self.collected.append(_counted(values, self.edges))
 
     def result(self) -> Array:
         return np.concatenate(self.collected)

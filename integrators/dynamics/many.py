@@ -5,7 +5,6 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,8 +14,7 @@ from integrators import registry
 from integrators.dynamics.together import Together
 from integrators.protocol import Array, MethodBase, Status, check_problem
 from integrators.running.many import members
-from integrators.running.watch import Bar, Report, Watch, identity, read
-from problems.errors import InputError, shown
+from integrators.running.watch import Bar, Report, Watch, check_progress, files, identity
 from problems.problem import Problem
 
 Outcome = tuple[ArrayLike, Status, str, int]
@@ -120,8 +118,7 @@ class Many:
     ) -> tuple[dict[str, Any], str]:
         """Do what `followed` says, for so many at a time, and at first."""
         progress, n = file.progress, len(self.rows)
-        if not callable(progress) and not isinstance(progress, bool):
-            raise InputError(f"progress={shown(progress)} must be True, False or a function of the progress.")
+        check_progress(progress)
         state: dict[str, Any] = {
             "values": np.full((n, *shape), np.nan),
             "status": [Status.INTERRUPTED] * n,
@@ -131,10 +128,8 @@ class Many:
         }
         starts = np.concatenate([self.rows.ravel(), self.par.ravel()])
         belongs = identity(self.problem, self.method, starts, told, {})
-        path = None if file.checkpoint is None else Path(file.checkpoint)
-        earlier = None if file.resume is None else Path(file.resume)
-        if earlier is not None and (earlier != path or earlier.exists()):
-            state = read(earlier, belongs)
+        path, kept = files(file.checkpoint, file.resume, belongs)
+        state = state if kept is None else kept
         with Bar() if progress is True else nullcontext(progress or None) as report:
             watch = Watch(0.0, float(n), report, path, file.every_seconds, belongs)
             with suppress(KeyboardInterrupt):

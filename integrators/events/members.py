@@ -3,7 +3,7 @@
 import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from integrators.protocol import (
 )
 from integrators.solution.occurrences import Occurrences
 
+Result = TypeVar("Result")
 Member = tuple[Trajectories, dict[str, Occurrences]]
 
 
@@ -47,19 +48,48 @@ def follow(
     list
         Of each trajectory (a batch of one), and what has happened in it by the events' names.
     """
-    stop = threading.Event()
 
-    def member(i: int) -> Member:
+    def member(i: int, stop: threading.Event) -> Member:
         return _single(start, starts[i], par[i], own_times(times, i), t0, stop)
 
-    if threads == 1 or len(starts) == 1:
-        return [member(i) for i in range(len(starts))]
+    return one_by_one(member, len(starts), threads)
+
+
+def one_by_one(member: Callable[[int, threading.Event], Result], count: int, threads: int) -> list[Result]:
+    """Return ``member(i, stop)`` of each trajectory, of as many at once as there are threads.
+
+    ``stop`` is set where one of them raises, as by Ctrl-C: the others are to come back at once.
+    """
+    stop = threading.Event()
+    if threads == 1 or count == 1:
+        return [member(i, stop) for i in range(count)]
     with ThreadPoolExecutor(threads) as pool:
         try:
-            return list(pool.map(member, range(len(starts))))
+            return list(pool.map(member, range(count), [stop] * count))
         except BaseException:
-            stop.set()  # the others come back at once
+            stop.set()
             raise
+
+
+def begun(
+    start: Callable[[], Any], y0: Array, times: Array, t0: float, stop: threading.Event
+) -> tuple[Any, Trajectories]:
+    """Return a stepper on its way to the last of some times, and what is known of its trajectory.
+
+    There is no stepper where a function of the user raises at the start, which ends the trajectory.
+    """
+    y, steps = np.full((1, times.size, y0.size), np.nan), np.zeros(1, dtype=np.int64)
+    known = Trajectories(times, y, [Status.RUNNING], [""], np.array([t0]), steps)
+    try:
+        stepper = start()
+    except UserError as raised:
+        known.status[0], known.reason[0] = Status.USER_ERROR, f"{raised} at the start, t = {t0!r}."
+        return None, known
+    if offers(stepper, Interruptible):
+        stepper.stop = stop
+    if offers(stepper, Destination):
+        stepper.destination = float(times[-1])
+    return stepper, known
 
 
 def own_times(times: Array, i: int) -> Array:
@@ -79,21 +109,14 @@ def ending_of(stepper: Any, samples: Samples, t0: float, end: float) -> Ending:
 def _single(
     start: Callable[..., Any], y0: Array, par: Array, times: Array, t0: float, stop: threading.Event
 ) -> Member:
-    y, steps = np.full((1, times.size, y0.size), np.nan), np.zeros(1, dtype=np.int64)
     end = float(times[-1])
-    try:
-        stepper = start(y0, par, t0, end)
-    except UserError as raised:
-        reason = f"{raised} at the start, t = {t0!r}."
-        return Trajectories(times, y, [Status.USER_ERROR], [reason], np.array([t0]), steps), {}
-    if offers(stepper, Interruptible):
-        stepper.stop = stop
-    if offers(stepper, Destination):
-        stepper.destination = end
+    stepper, result = begun(lambda: start(y0, par, t0, end), y0, times, t0, stop)
+    if stepper is None:
+        return result, {}
     samples = stepper.advance(times)
     ending = ending_of(stepper, samples, t0, end)
     n = ending.count(samples.t, stepper.search)
-    y[0, :n], steps[0] = samples.y[:n], stepper.stats.steps
-    result = Trajectories(times, y, [ending.status], [ending.reason], np.array([ending.stop]), steps)
+    result.y[0, :n], result.steps[0] = samples.y[:n], stepper.stats.steps
+    result.status[0], result.reason[0], result.t_stop[0] = ending.status, ending.reason, ending.stop
     result.extra[0] = telling(stepper.stats)
     return result, stepper.search.hits.occurrences()

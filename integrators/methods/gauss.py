@@ -100,7 +100,6 @@ class Gauss(MethodBase):
     steps: Steps | None = None
     precision: Precision = "double"
 
-    library = "hbvm-bench"
     built = "compiled on this machine by numba"
     computes_with = ("numpy", "numba", "llvmlite")
     citation = cite("HairerLubichWanner2006")

@@ -182,7 +182,6 @@ class HBVM(MethodBase):
     atol: Absolute | None = None
     projection: Projection | None = None
 
-    library = "hbvm-bench"
     built = "compiled on this machine by numba"
     computes_with = ("numpy", "numba", "llvmlite")
     citation = cite("BrugnanoIavernaro2016")

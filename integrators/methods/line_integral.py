@@ -115,7 +115,6 @@ class LineIntegral(MethodBase):
     atol: Absolute | None = None
     invariants: Annotated[Sequence[str], _Names()]
 
-    library = "hbvm-bench"
     built = "compiled on this machine by numba"
     computes_with = ("numpy", "numba", "llvmlite")
     citation = cite("BrugnanoIavernaro2012", "BrugnanoIavernaro2016")

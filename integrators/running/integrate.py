@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from math import isfinite
-from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Any, cast
 
@@ -40,7 +39,7 @@ from integrators.refusals import check_interval, check_times
 from integrators.running.course import Course
 from integrators.running.digits import check_digits, pairs
 from integrators.running.variations import follow
-from integrators.running.watch import SOON, Bar, Report, Watch, identity, read
+from integrators.running.watch import SOON, Bar, Report, Watch, check_progress, files, identity
 from integrators.solution.record import Solution, solution_of
 from problems import limits
 from problems.analysis.tables import check_tables
@@ -155,8 +154,7 @@ def integrate(
     if method is None:
         method = registry.create("HBVM")
     check_problem(problem, method)
-    if not callable(progress) and not isinstance(progress, bool):
-        raise InputError(f"progress={shown(progress)} must be True, False or a function of the progress.")
+    check_progress(progress)
     if progress is True:
         with Bar() as bar:
             return integrate(
@@ -181,10 +179,7 @@ def integrate(
     watch, kept = None, None
     if progress or checkpoint is not None or resume is not None:
         belongs = identity(problem, method, grid, sample, wanted, variations, begin)
-        path = None if checkpoint is None else Path(checkpoint)
-        earlier = None if resume is None else Path(resume)
-        if earlier is not None and (earlier != path or earlier.exists()):
-            kept = read(earlier, belongs)
+        path, kept = files(checkpoint, resume, belongs)
         watch = Watch(problem.t0, end, progress or None, path, every_seconds, belongs)
 
     if begin is None:

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext, suppress
-from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Any, Literal, cast
 
@@ -40,7 +39,7 @@ from integrators.running.pieces import (
 )
 from integrators.running.variations import check as check_vectors
 from integrators.running.variations import directions_of_each
-from integrators.running.watch import SOON, Bar, Progress, Report, Watch, identity, read
+from integrators.running.watch import SOON, Bar, Progress, Report, Watch, check_progress, files, identity
 from integrators.solution.ensemble import Solutions
 from problems.analysis.tables import check_tables
 from problems.checks import NOTHING, File, Named, at_least, checked_arguments
@@ -167,15 +166,13 @@ def integrate_many(
     if method is None:
         method = registry.create("HBVM")
     check_problem(problem, method)
-    if not callable(progress) and not isinstance(progress, bool):
-        raise InputError(f"progress={shown(progress)} must be True, False or a function of the progress.")
+    check_progress(progress)
     system = problem.system
     rows, par = members("integrate_many", problem, starts, parameters)
     n, grid = len(rows), _times(problem, times, len(rows))
     for end in {float(np.nanmin(grid)), float(np.nanmax(grid))}:
         check_tables(problem.system, problem.par, problem.t0, end)
-    kept = min(grid.shape[-1], 1) if reduce else grid.shape[-1]
-    check_batch(rows, par, np.empty(kept), system)
+    check_batch(rows, par, np.empty(min(grid.shape[-1], 1) if reduce else grid.shape[-1]), system)
     looked_for = named(events) if not isinstance(events, Sequence) or events else {}
     _check_together(method, backend, sample, reduce, executor, looked_for, grid)
     if variations is not None and (backend is not None or looked_for or reduce or sample == "steps"):
@@ -196,10 +193,9 @@ def integrate_many(
         "reduce": ", ".join(f"{name} {item.digest}" for name, item in reduce.items()),
     }  # fmt: skip
     gathered = Gathered(problem, method, rows, par, grid, sample, reducer, directions)
-    path = None if checkpoint is None else Path(checkpoint)
-    earlier = None if resume is None else Path(resume)
-    if earlier is not None and (earlier != path or earlier.exists()):
-        gathered.restore(read(earlier, belongs))
+    path, kept = files(checkpoint, resume, belongs)
+    if kept is not None:
+        gathered.restore(kept)
     watch = Watch(problem.t0, 1.0, None, path, SECONDS, belongs)
     size = _fixed_size(piece, executor, reduce, n, grid.shape[-1] * system.dim)
 

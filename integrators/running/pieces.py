@@ -5,7 +5,7 @@ import pickle
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor, Executor, Future
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any
@@ -15,20 +15,17 @@ from numpy.typing import NDArray
 
 from integrators.events.event import Event
 from integrators.events.finder import started_with_events
-from integrators.events.members import follow, own_times
+from integrators.events.members import begun, follow, one_by_one, own_times
 from integrators.protocol import (
     Array,
     Batches,
     BatchesAlong,
     BatchesEvents,
-    Destination,
-    Interruptible,
     MethodBase,
     Program,
     Status,
     Threads,
     Trajectories,
-    UserError,
     offers,
     telling,
 )
@@ -80,22 +77,12 @@ def alone(
     Trajectories
         Rows that are shorter than others end with NaN.
     """
-    stop = threading.Event()
 
-    def member(i: int) -> Trajectories:
+    def member(i: int, stop: threading.Event) -> Trajectories:
         along = None if directions is None else (directions[0][i], directions[1][i])
         return _single(program, starts[i], par[i], own_times(times, i), t0, sample, stop, along)
 
-    if threads == 1 or len(starts) == 1:
-        members = [member(i) for i in range(len(starts))]
-    else:
-        with ThreadPoolExecutor(threads) as pool:
-            try:
-                members = list(pool.map(member, range(len(starts))))
-            except BaseException:
-                stop.set()  # the others come back at once
-                raise
-    return joined(members, times)
+    return joined(one_by_one(member, len(starts), threads), times)
 
 
 def joined(members: list[Trajectories], times: Array) -> Trajectories:
@@ -144,17 +131,9 @@ def _single(
     stop: threading.Event,
     along: tuple[Array, Array] | None,
 ) -> Trajectories:
-    try:
-        stepper: Any = program.start(y0, par, t0)
-    except UserError as raised:
-        reason = f"{raised} at the start, t = {t0!r}."
-        nothing = np.full((1, times.size, y0.size), np.nan)
-        none = np.zeros(1, dtype=np.int64)
-        return Trajectories(times, nothing, [Status.USER_ERROR], [reason], np.array([t0]), none)
-    if offers(stepper, Interruptible):
-        stepper.stop = stop
-    if offers(stepper, Destination):
-        stepper.destination = float(times[-1])
+    stepper, known = begun(lambda: program.start(y0, par, t0), y0, times, t0, stop)
+    if stepper is None:
+        return known
     if along is not None:
         stepper.follow(*along)
     if sample == "steps":
@@ -162,7 +141,7 @@ def _single(
         t, y = samples.t, samples.y[np.newaxis]
     else:
         samples = stepper.advance(times, sample=sample)
-        t, y = times, np.full((1, times.size, y0.size), np.nan)
+        t, y = times, known.y
         y[0, : samples.t.size] = samples.y
     end = times[-1] if samples.status is Status.FINISHED else stepper.t
     steps = np.array([stepper.stats.steps])

@@ -174,6 +174,30 @@ def _digest(variations: Any) -> str:
     return f"{array.shape}, {hashlib.sha256(array.tobytes()).hexdigest()}"
 
 
+def check_progress(progress: Any) -> None:
+    """Refuse what is no way of showing progress.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If it is none.
+    """
+    if not callable(progress) and not isinstance(progress, bool):
+        raise InputError(f"progress={shown(progress)} must be True, False or a function of the progress.")
+
+
+def files(checkpoint: Any, resume: Any, belongs: Mapping[str, str]) -> tuple[Path | None, Any]:
+    """Return the path of the file to be written, and what the file to resume holds.
+
+    ``None`` where there is none; with the same path for both, a first integration begins at the start.
+    """
+    path = None if checkpoint is None else Path(checkpoint)
+    earlier = None if resume is None else Path(resume)
+    if earlier is None or (earlier == path and not earlier.exists()):
+        return path, None
+    return path, read(earlier, belongs)
+
+
 def read(path: str | os.PathLike[str], wanted: Mapping[str, str]) -> dict[str, Any]:
     """Return what was kept of the same integration.
 

@@ -4,12 +4,12 @@ from typing import Any
 
 from llvmlite import ir
 from numba import types
-from numba.extending import lower_setattr_generic, models, register_model
+from numba.extending import lower_setattr_generic
 
 from integrators.kernel.native import jit
 from integrators.kernel.native.memory import Integer, Memory, Part, Real, Table
 from integrators.kernel.simd.emit import INTEGER
-from integrators.kernel.simd.lanes import intrinsic
+from integrators.kernel.simd.lanes import intrinsic, represent
 from integrators.kernel.simd.views import DOUBLES, INTEGERS
 
 
@@ -21,10 +21,7 @@ class MemoryType(types.Type):
         super().__init__(name=f"Memory({declared.__module__}.{declared.__qualname__})")
 
 
-@register_model(MemoryType)
-class _MemoryModel(models.PrimitiveModel):
-    def __init__(self, manager: Any, kind: Any):
-        super().__init__(manager, kind, INTEGER.as_pointer())
+represent(MemoryType, lambda kind: INTEGER.as_pointer())
 
 
 def _kind(slot: Any) -> Any:

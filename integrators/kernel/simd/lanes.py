@@ -12,6 +12,7 @@ A vector field reads and writes them through the views of `integrators.kernel.si
 
 import math
 import operator
+from collections.abc import Callable
 from inspect import signature
 from itertools import product
 from typing import Any, cast
@@ -48,16 +49,18 @@ class Mask(types.Type):
         super().__init__(name=f"Mask({count})")
 
 
-@register_model(Lanes)
-class _LanesModel(models.PrimitiveModel):
-    def __init__(self, manager: Any, kind: Any):
-        super().__init__(manager, kind, vector(kind.count))
+def represent(kinds: Any, by: Callable[[Any], Any]) -> None:
+    """Have values of a class of numba types be what ``by`` makes of such a type, a type of LLVM's."""
+
+    class Model(models.PrimitiveModel):
+        def __init__(self, manager: Any, kind: Any):
+            super().__init__(manager, kind, by(kind))
+
+    register_model(kinds)(Model)
 
 
-@register_model(Mask)
-class _MaskModel(models.PrimitiveModel):
-    def __init__(self, manager: Any, kind: Any):
-        super().__init__(manager, kind, ir.VectorType(ir.IntType(1), kind.count))
+represent(Lanes, lambda kind: vector(kind.count))
+represent(Mask, lambda kind: ir.VectorType(ir.IntType(1), kind.count))
 
 
 # --- values in and out of vectors ---------------------------------------------------------------

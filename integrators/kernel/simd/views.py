@@ -13,7 +13,6 @@ from typing import Any
 
 from llvmlite import ir
 from numba import types
-from numba.extending import models, register_model
 
 from integrators.kernel.simd.emit import ALIGNMENT, DOUBLE, INTEGER, vector
 from integrators.kernel.simd.lanes import (
@@ -21,6 +20,7 @@ from integrators.kernel.simd.lanes import (
     arguments_for,
     intrinsic,
     lower_builtin,
+    represent,
     spread_to,
     type_callable,
 )
@@ -51,20 +51,12 @@ DOUBLES = Numbers()
 INTEGERS = Numbers(kind=types.int64)
 
 
-@register_model(Rows)
-class _RowsModel(models.PrimitiveModel):
-    def __init__(self, manager: Any, kind: Any):
-        super().__init__(manager, kind, DOUBLE.as_pointer())
-
-
-@register_model(Numbers)
-class _NumbersModel(models.PrimitiveModel):
-    def __init__(self, manager: Any, kind: Any):
-        super().__init__(manager, kind, _item(kind).as_pointer())
-
-
 def _item(view: Any) -> Any:
     return DOUBLE if view.dtype == types.float64 else INTEGER
+
+
+represent(Rows, lambda kind: DOUBLE.as_pointer())
+represent(Numbers, lambda kind: _item(kind).as_pointer())
 
 
 def _aligned(stride: int) -> int:

@@ -9,10 +9,9 @@ from typing import Any
 
 from llvmlite import ir
 from numba import types
-from numba.extending import models, register_model
 
 from integrators.kernel.simd.emit import INTEGER, vector
-from integrators.kernel.simd.lanes import Lanes, Mask, intrinsic, lower_builtin, type_callable
+from integrators.kernel.simd.lanes import Lanes, Mask, intrinsic, lower_builtin, represent, type_callable
 
 
 class Words(types.Type):
@@ -23,10 +22,7 @@ class Words(types.Type):
         super().__init__(name=f"Words({count})")
 
 
-@register_model(Words)
-class _WordsModel(models.PrimitiveModel):
-    def __init__(self, manager: Any, kind: Any):
-        super().__init__(manager, kind, ir.VectorType(INTEGER, kind.count))
+represent(Words, lambda kind: ir.VectorType(INTEGER, kind.count))
 
 
 @intrinsic
