@@ -87,8 +87,9 @@ def claims_of(parts: Sequence[Part], results: Results, title: str, nav: str, giv
 
 
 def sections_of(parts: Sequence[Part], results: Results) -> list[Section]:
-    """Return the section of each part."""
+    """Return the section of each part of which anything was computed: results may be older than a part."""
     return [
         Section(part.title, attempt(*part.blocks(PartResults(part, results))), part.key, nav=part.title)
         for part in parts
+        if any(task.key in results.computed for task in part.tasks)
     ]

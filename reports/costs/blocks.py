@@ -20,7 +20,7 @@ from hbvm_bench.summaries.rows import format_metric, grouped_by, status_of
 from hbvm_bench.summaries.table import NONE, Table
 from integrators.methods.hbvm import HBVM
 
-from . import experiments, variations
+from . import experiments, gradients, threads, variations
 from .beside_c import ECCENTRICITY, IN_C, OURS, SOURCE, STEP, BesideC, beside_c
 from .experiments import CALLED, FIRST, ON_LATTICES, STEPPED, Iterations, Times
 
@@ -28,6 +28,7 @@ DEFAULT = "HBVM()"
 METRICS = ("warm_seconds", "steps", "evaluations", "energy_max", "position_end")
 SIZES, QUICK_SIZES = (10, 100, 1000, 4000), (10, 100)
 ROUNDS, QUICK_ROUNDS = 40, 3
+FEW, QUICK_FEW = 7, 1  # rounds of longer runs
 FRESH, QUICK_FRESH = 3, 1
 C_STEPS, QUICK_C_STEPS = 100_000, 2_000  # long enough for the overhead of a call, some 50 µs, not to count
 LATTICE_END, QUICK_END = 10.0, 2.0
@@ -75,7 +76,7 @@ class Ratio:
 def parts(*, quick: bool) -> list[Part]:
     """Return what is computed and shown beside the cases, in a quick run or a whole one."""
     sizes, t_end = (QUICK_SIZES, QUICK_END) if quick else (SIZES, LATTICE_END)
-    rounds, fresh = (QUICK_ROUNDS, QUICK_FRESH) if quick else (ROUNDS, FRESH)
+    rounds, few, fresh = (QUICK_ROUNDS, QUICK_FEW, QUICK_FRESH) if quick else (ROUNDS, FEW, FRESH)
     c_task = Task("times", partial(beside_c, QUICK_C_STEPS if quick else C_STEPS, rounds), timed=True)
     lattices = [Task(f"of {n}", partial(experiments.iterations, n, t_end), cost=n / 100) for n in sizes]
 
@@ -100,6 +101,8 @@ def parts(*, quick: bool) -> list[Part]:
             lambda results: [("the steps in C", lambda: in_c(results["times"]))],
         ),
         variations.part(rounds),
+        gradients.part(few),
+        threads.part(few, quick=quick),
         measured("first", "The first result of a fresh process", experiments.first_results, fresh, fresh_),
     ]
 

@@ -119,17 +119,17 @@ def first_results(rounds: int) -> Times:
         with tempfile.TemporaryDirectory(prefix="hbvm-bench-") as cache:
             return _fresh(text, Path(cache))
 
-    return _taken({text: partial(sample, text) for text in FIRST}, rounds)
+    return taken({text: partial(sample, text) for text in FIRST}, rounds)
 
 
 def taken_on_a_core(samples: dict[str, Callable[[], float]], rounds: int) -> Times:
     """Take samples in this process, on one core, after a round that is left out."""
     with machine.staying_on_a_core(), no_collection():
         interleaved([*samples.values()], 1)
-        return _taken(samples, rounds)
+        return taken(samples, rounds)
 
 
-def _taken(samples: dict[str, Callable[[], float]], rounds: int) -> Times:
+def taken(samples: dict[str, Callable[[], float]], rounds: int) -> Times:
     """Take the samples in turn, and look at what else the machine does."""
     before = busy()
     seconds = interleaved([*samples.values()], rounds)
@@ -163,6 +163,13 @@ def _fresh(method: str, caches: Path) -> float:
     if said != Status.FINISHED.value:
         raise InputError(f"the fresh process with {method} gave no result.")
     return seconds
+
+
+def seconds_of(run: Callable[[], object]) -> float:
+    """Return the seconds of one run."""
+    begun = time.perf_counter()
+    run()
+    return time.perf_counter() - begun
 
 
 def finished(solution: Solution) -> Any:

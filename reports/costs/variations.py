@@ -4,7 +4,6 @@ The same problem goes through HBVM and through heyoka's `var_ode_sys` of first o
 one process: with the derivative with respect to one component of the start, and to all four.
 """
 
-import time
 from collections.abc import Callable
 from functools import partial
 
@@ -22,7 +21,7 @@ from problems import targets
 from problems.errors import InputError
 from problems.problem import Problem
 
-from .experiments import Times, finished, taken_on_a_core
+from .experiments import Times, finished, seconds_of, taken_on_a_core
 
 KEY, TITLE = "variations", "Tangent vectors"
 END = 1000.0
@@ -37,23 +36,35 @@ def problem() -> Problem:
 
 
 class Variational:
-    """The problem with the derivatives with respect to its first components, compiled by heyoka.
+    """A problem with the derivatives with respect to its first components and parameters, by heyoka.
 
     Parameters
     ----------
-    count : int
-        How many; with 0 the problem alone.
+    given : Problem
+        Traced.
+    count, parameters : int
+        How many; with none the problem alone.
+    tol, compact_mode
+        Options of heyoka.
     """
 
-    def __init__(self, count: int):
+    def __init__(
+        self,
+        given: Problem,
+        count: int,
+        parameters: int = 0,
+        *,
+        tol: float = TOLERANCE,
+        compact_mode: bool = False,
+    ):
         import heyoka as hy
 
-        self._problem, self._done = problem(), hy.taylor_outcome.time_limit
-        equations = targets.heyoka(self._problem.system)
-        if count:
-            equations = hy.var_ode_sys(equations, [equations[i][0] for i in range(count)], order=1)
+        self._problem, self._done = given, hy.taylor_outcome.time_limit
+        equations = targets.heyoka(given.system)
+        if wrt := [equations[i][0] for i in range(count)] + [hy.par[i] for i in range(parameters)]:
+            equations = hy.var_ode_sys(equations, wrt, order=1)
         self._taylor = hy.taylor_adaptive(
-            equations, self._problem.y0.tolist(), tol=TOLERANCE, pars=self._problem.par
+            equations, given.y0.tolist(), tol=tol, pars=given.par, compact_mode=compact_mode
         )
         self._start = self._taylor.state.copy()
 
@@ -67,8 +78,8 @@ class Variational:
         """
         self._taylor.time = self._problem.t0
         self._taylor.state[:] = self._start
-        if self._taylor.propagate_until(END)[0] != self._done:
-            raise InputError(f"heyoka ended at t = {self._taylor.time!r} of {END!r}.")
+        if self._taylor.propagate_until(self._problem.t_end)[0] != self._done:
+            raise InputError(f"heyoka ended at t = {self._taylor.time!r} of {self._problem.t_end!r}.")
         return self._taylor.state
 
 
@@ -81,14 +92,8 @@ def times(rounds: int) -> Times:
         finished(integrate(henon_heiles, method, [END], variations=vectors))
 
     runs: dict[str, Callable[[], object]] = {f"hbvm {n}": partial(ours, n) for n in COUNTS}
-    runs |= {f"heyoka {n}": Variational(n).run for n in COUNTS}
-    return taken_on_a_core({name: partial(_seconds, run) for name, run in runs.items()}, rounds)
-
-
-def _seconds(run: Callable[[], object]) -> float:
-    begun = time.perf_counter()
-    run()
-    return time.perf_counter() - begun
+    runs |= {f"heyoka {n}": Variational(henon_heiles, n).run for n in COUNTS}
+    return taken_on_a_core({name: partial(seconds_of, run) for name, run in runs.items()}, rounds)
 
 
 def part(rounds: int) -> Part:

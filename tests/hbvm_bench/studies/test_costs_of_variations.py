@@ -17,14 +17,16 @@ def test_both_libraries_have_the_same_derivatives(count, monkeypatch):
     monkeypatch.setattr(variations, "END", 30.0)  # the orbit is chaotic
     problem = variations.problem()
     dim = problem.system.dim
-    ours = integrate(problem, HBVM(), [problem.t_end], variations=np.eye(dim)[:, :count]).variations[0]
-    state = variations.Variational(count).run()
+    solution = integrate(problem, HBVM(), [problem.t_end], variations=np.eye(dim)[:, :count])
+    assert solution.variations is not None
+    ours = solution.variations[0]
+    state = variations.Variational(problem, count).run()
     theirs = state[dim:].reshape(dim, count)
     assert np.abs(ours - theirs).max() / np.abs(ours).max() < 1e-12  # measured: 5.2e-14
 
 
 def test_another_run_begins_at_the_start():
-    member = variations.Variational(1)
+    member = variations.Variational(variations.problem(), 1)
     assert np.array_equal(member.run().copy(), member.run())
 
 
