@@ -22,7 +22,6 @@ WAYS = """<a class="brand" href="../../index.html">hbvm-bench</a>
 <a href="../../reports.html">All reports</a>
 <a href="../../howto/reading_a_report.html">How to read a report</a>
 </nav>"""
-OUT = re.compile(r'<nav class="ways" aria-label="All reports">.*?</nav>', re.DOTALL)  # of local pages
 FILES = ("*.svg", "*.xz")
 
 
@@ -71,8 +70,8 @@ def _copy(app: Sphinx, error: Exception | None) -> None:
             below = page.relative_to(path.parent)
             (folder / below).parent.mkdir(parents=True, exist_ok=True)
             ways = WAYS.replace('href="', 'href="' + "../" * (len(below.parts) - 1))
-            text = OUT.sub("", page.read_text(encoding="utf-8"), count=1)
-            (folder / below).write_text(text.replace(BRAND, ways, 1), encoding="utf-8")
+            text = page.read_text(encoding="utf-8").replace(BRAND, ways, 1)
+            (folder / below).write_text(text, encoding="utf-8")
         for file in (file for pattern in FILES for file in path.parent.rglob(pattern)):
             (folder / file.relative_to(path.parent)).parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(file, folder / file.relative_to(path.parent))

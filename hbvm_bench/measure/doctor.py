@@ -72,22 +72,22 @@ def libraries() -> list[Finding]:
     findings: list[Finding] = []
     for extra, without in WITHOUT.items():
         state: State = "bad" if extra == "peers" else "note"
-        missing = f"not installed: {without}", f"pip install 'hbvm-bench[{extra}]'"
         for name in of_extra(extra):
-            try:
-                findings.append(Finding(name, "ok", version(name)))
-            except PackageNotFoundError:
-                absent = Finding(name, state, *missing)
-                if name in without_wheels():
-                    absent = Finding(name, "note", "not installed: it has no wheels for this system")
-                findings.append(absent)
-    for name in APART:
-        try:
-            findings.append(Finding(name, "ok", version(name)))
-        except PackageNotFoundError:
-            missing = "not installed: its methods are refused"
-            findings.append(Finding(name, "note", missing, f"pip install {name}"))
-    return findings
+            if name in without_wheels():
+                findings.append(_library(name, "note", "not installed: it has no wheels for this system"))
+            else:
+                advice = f"pip install 'hbvm-bench[{extra}]'"
+                findings.append(_library(name, state, f"not installed: {without}", advice))
+    refused = "not installed: its methods are refused"
+    return findings + [_library(name, "note", refused, f"pip install {name}") for name in APART]
+
+
+def _library(name: str, state: State, missing: str, advice: str = "") -> Finding:
+    """Return the version of a library, or what is said where it is missing."""
+    try:
+        return Finding(name, "ok", version(name))
+    except PackageNotFoundError:
+        return Finding(name, state, missing, advice)
 
 
 def of_extra(extra: str) -> list[str]:

@@ -8,7 +8,6 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
-from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
@@ -32,7 +31,6 @@ from hbvm_bench.summaries.rows import Cell, Row, seconds
 
 HERE = "hbvm_bench.report"
 PLACE = "problem-"  # how the anchors of the sections of problems begin
-READING = "docs/howto/reading_a_report.md"
 SCRIPTS = ("script.js", "table.js", "figures.js")
 TOGETHER, ONE_PAGE = 4, 100  # problems and rows; with more of both each problem has a page of its own
 INLINE = 150_000  # characters of drawings in the text of a page; a script unpacks the others
@@ -78,31 +76,8 @@ class Place:
         return replace(self, level=self.level + 1)
 
 
-def outward(folder: Path) -> dict[str, str]:
-    """Return links from a page in a folder to the list of reports and to how to read one, if these exist."""
-    places = {
-        "All reports": ("../README.md", "../../../reports/README.md"),
-        "How to read a report": (f"../../{READING}", f"../../../{READING}"),
-    }
-    found = {
-        title: next((place for place in listed if _leads(folder, place)), None)
-        for title, listed in places.items()
-    }
-    return {title: place for title, place in found.items() if place}
-
-
-def _leads(folder: Path, place: str) -> bool:
-    """Whether a file is there, and is the list of the reports where it is called README."""
-    path = (folder / place).resolve()
-    return path.is_file() and (path.name != "README.md" or path.parent.name == "reports")
-
-
-def pages(document: Document, folder: Path | None = None) -> dict[str, str]:
-    """Return the pages of a document by name: ``index.html``, and one for each problem of a long one.
-
-    Those that will stand in ``folder`` link to the pages around it; see `outward`.
-    """
-    out = {} if folder is None else outward(folder.resolve())
+def pages(document: Document) -> dict[str, str]:
+    """Return the pages of a document by name: ``index.html``, and one for each problem of a long one."""
     sections = [
         section
         for section in document.blocks
@@ -110,7 +85,7 @@ def pages(document: Document, folder: Path | None = None) -> dict[str, str]:
     ]
     table = next((block for block in document.walk() if isinstance(block, CaseTable)), None)
     if table is None or len(sections) <= TOGETHER or sum(map(len, _rows_by_problem(table))) <= ONE_PAGE:
-        return {"index.html": page(document, out=out)}
+        return {"index.html": page(document)}
     names = {section.key: f"{section.key}.html" for section in sections}
     contents = Section(
         "Problems",
@@ -120,7 +95,7 @@ def pages(document: Document, folder: Path | None = None) -> dict[str, str]:
     )
     kept = [contents if block is sections[0] else block for block in document.blocks]
     first = [_without(block, table) for block in kept if block not in sections]
-    texts = {"index.html": page(replace(document, blocks=first), out=out)}
+    texts = {"index.html": page(replace(document, blocks=first))}
     for number, section in enumerate(sections):
         near = {"Previous problem": number - 1, "Next problem": number + 1}
         ways = {title: names[sections[i].key] for title, i in near.items() if 0 <= i < len(sections)}
@@ -132,7 +107,7 @@ def pages(document: Document, folder: Path | None = None) -> dict[str, str]:
             lead=[f"`{section.code}`"] if section.code else [],
             blocks=[cases, *section.blocks],
         )
-        texts[names[section.key]] = page(alone, {document.title: "index.html", **ways}, out)
+        texts[names[section.key]] = page(alone, {document.title: "index.html", **ways})
     return texts
 
 
@@ -149,12 +124,10 @@ def _without(block: Block, left_out: Block) -> Block:
     )
 
 
-def page(
-    document: Document, ways: Mapping[str, str] | None = None, out: Mapping[str, str] | None = None
-) -> str:
+def page(document: Document, ways: Mapping[str, str] | None = None) -> str:
     """Return a document as HTML that asks nothing of the network and runs no script but its own.
 
-    ``ways`` are links to other pages of the report, ``out`` those to pages around it, by their titles.
+    ``ways`` are links to other pages of the report, by their titles.
     """
     looks = document.looks
     script = "".join(text(name) for name in SCRIPTS)
@@ -174,11 +147,7 @@ def page(
         "dark": variables(DARK_NEUTRALS | {f"--m{look.number}": look.dark for look in looks}),
         "symbols": symbols(looks),
     }
-    return (
-        templates()
-        .get_template("base.html.j2")
-        .render(document=document, ways=ways or {}, out=out or {}, **parts)
-    )
+    return templates().get_template("base.html.j2").render(document=document, ways=ways or {}, **parts)
 
 
 def printed(blocks: Sequence[Block], at: Place) -> Markup:

@@ -11,10 +11,10 @@ from hbvm_bench.store.files import write_all
 TEXT = "report.md"
 
 
-def rendered(document: Document, directory: Path | None = None) -> dict[str, bytes]:
-    """Return all files of a document by their path in its directory; pages link to what is around it."""
+def rendered(document: Document) -> dict[str, bytes]:
+    """Return all files of a document by their path in its directory."""
     files = {TEXT: markdown(document).encode()}
-    files |= {name: text.encode() for name, text in pages(document, directory).items()}
+    files |= {name: text.encode() for name, text in pages(document).items()}
     return {picture.file: picture.svg.encode() for picture in document.pictures} | files
 
 
@@ -30,6 +30,6 @@ def write(document: Document, directory: Path, beside: Mapping[str, bytes] | Non
     beside : mapping of str to bytes, optional
         Other files that belong to it, by name.
     """
-    files = {**(beside or {}), **rendered(document, directory)}
+    files = {**(beside or {}), **rendered(document)}
     write_all({directory / name: content for name, content in files.items()})
     return [directory / TEXT, directory / "index.html"]

@@ -208,29 +208,6 @@ def test_a_long_report_has_a_page_for_each_problem_that_links_back():
     assert [*html.pages(document(opened([REPORTS / "paper" / "sitnikov"])))] == ["index.html"]
 
 
-def test_a_page_links_to_the_list_of_reports_and_to_how_to_read_one_where_these_exist(tmp_path):
-    made = Document("t", ["l"], [])
-    here, run = tmp_path / "reports" / "mine", tmp_path / "runs" / "mine" / "report"
-    for folder in (here, run):
-        folder.mkdir(parents=True)
-        assert "All reports" not in html.pages(made, folder)["index.html"]
-    (tmp_path / "README.md").write_text("not the list of reports")
-    (tmp_path / "reports" / "README.md").write_text("# Reports")
-    reading = tmp_path / "docs" / "howto" / "reading_a_report.md"
-    reading.parent.mkdir(parents=True)
-    reading.write_text("# Reading a report")
-    for folder in (here, run, tmp_path / "out"):
-        folder.mkdir(exist_ok=True)
-        addresses = html.outward(folder)
-        assert {(folder / address).resolve() for address in addresses.values()} <= {
-            reading,
-            tmp_path / "reports" / "README.md",
-        }
-        assert len(addresses) == (0 if folder.name == "out" else 2)
-        page = html.pages(made, folder)["index.html"]
-        assert all(f'<a href="{address}">{title}</a>' in page for title, address in addresses.items())
-
-
 def test_a_family_has_one_look_everywhere_and_shades_of_one_hue_differ():
     made = looks(["DOP853", "Radau", "HBVM", "DOP853"])
     assert [look.number for look in made.values()] == [1, 2, 3]
