@@ -10,7 +10,7 @@ from integrators.kernel.step.begin import INFINITY
 from integrators.kernel.step.coefficients import coefficient
 from integrators.kernel.step.control import RETREAT, SHORTEST, SHRINK, TIME_TOLERANCE
 from integrators.kernel.step.estimate import NARROWEST, SMOOTH_GAP, block_size, estimate, is_gap
-from integrators.kernel.step.rounding import known_noise, measure_noise, measure_noise_behind
+from integrators.kernel.step.rounding import measure_noise, measure_noise_behind, noise_at_end
 from integrators.kernel.step.sample import put_in_lanes
 from integrators.kernel.step.sums import time_after
 
@@ -183,7 +183,7 @@ def look_at_ends(ctx):
         far = max(finite(before), finite(after))
         # A crossing beyond the last node is no smooth field's distance from its polynomial.
         smooth = 0.0 if surfaces.crossed else discontinuities.last_coefficients[d]
-        smooth = SMOOTH_GAP * max(smooth, known_noise(ctx, d))
+        smooth = max(SMOOTH_GAP * smooth, noise_at_end(ctx, d))
         if far > smooth and far > least * block_size(ctx, ctx.blocks.of_row[d]):
             return True
         if discontinuities.boundary == EXTRAPOLATED and differs_from_previous(ctx, d, values[lanes * d]):
@@ -208,8 +208,8 @@ def differs_from_previous(ctx, d, value):
     """Whether the polynomial of the previous step is far from the field's value at its end, in row d."""
     far = finite(abs(value - previous_end(ctx, d)))
     least = ctx.discontinuities.negligible / (abs(ctx.controller.previous_length) * ctx.tables.nodes[0])
-    last = max(ctx.discontinuities.previous_last_coefficients[d], known_noise(ctx, d))
-    return far > SMOOTH_GAP * last and far > least * block_size(ctx, ctx.blocks.of_row[d])
+    smooth = max(SMOOTH_GAP * ctx.discontinuities.previous_last_coefficients[d], noise_at_end(ctx, d))
+    return far > smooth and far > least * block_size(ctx, ctx.blocks.of_row[d])
 
 
 @compiled

@@ -31,7 +31,9 @@ BEYOND_NOISE = 40.0
 EVIDENT = 10.0 * STAGNATION
 # Of a component: a line on which it moves by so little tells nothing of the field but noise.
 LEAST_WAY = 2.0**-46
-GOLDEN = 0.618  # multiples of it, but for their integers, are in no order
+# Random numbers below MODULUS (W. H. Press et al., Numerical Recipes, 2nd edition, section 7.1). With regular
+# ones the neighbours of some masses of a chain are moved so that the terms of their field cancel.
+MULTIPLIER, INCREMENT, MODULUS = 1664525, 1013904223, 2**32
 
 
 @compiled
@@ -73,6 +75,15 @@ def known_noise(ctx, d):
 
 
 @compiled
+def noise_at_end(ctx, d):
+    """Return what noise explains of row d of the field at an end of a step, beside its polynomial there.
+
+    That is the sum of k coefficients times values sqrt(2j + 1): of k times the deviation of one of them.
+    """
+    return BEYOND_NOISE * ctx.k * known_noise(ctx, d)
+
+
+@compiled
 def known_rounding(ctx, d):
     """As `known_noise`: in a formula, of no more than rounding adds in a step that can be solved."""
     noise = known_noise(ctx, d)
@@ -106,8 +117,14 @@ def measure_noise_behind(ctx):
 
 @compiled
 def largest_in_group(ctx, b):
-    """Return the largest size that a block of the group of block b has had, for the mass of that."""
-    return ctx.estimate.largest[ctx.blocks.group[b]] * ctx.blocks.mass[b]
+    """Return the largest size that a block of the group of block b has had, for the mass of that.
+
+    In second-order form that is at least what would move the positions by their own size in a step: the
+    iteration solves for them alone, and converges whatever rounding leaves of momenta near rest.
+    """
+    g = ctx.blocks.group[b]
+    moving = ctx.blocks.largest[g] / abs(ctx.h) if ctx.second else 0.0
+    return max(ctx.estimate.largest[g], moving) * ctx.blocks.mass[b]
 
 
 @compiled
@@ -168,7 +185,7 @@ def measure_on_line(ctx, state, end, start, h, part, noise):
     noise : array
         The coefficients, for all blocks.
     """
-    rows, lanes, scratch = ctx.rows, ctx.lanes, ctx.scratch
+    rows, lanes, scratch, random = ctx.rows, ctx.lanes, ctx.scratch, 1 if start == 0.0 else 2
     for chunk in range(ctx.chunks):
         c = get(ctx.tables.nodes, 8 * chunk)
         put(ctx.times, 8 * chunk, splat8(ctx.t0) + (splat8(start) + c * splat8(part * h)))
@@ -183,8 +200,9 @@ def measure_on_line(ctx, state, end, start, h, part, noise):
             continue  # what stays 0 is not rounded: the field may not be defined, or another one, beside it
         left = UNIT / ctx.blocks.weights[d]
         for i in range(ctx.k):
-            above = GOLDEN * (i + 1) * (d + 1) % 1.0 < 0.5
-            scratch.old_stages[offset(ctx, i // 8) + lanes * d + i % 8] += left if above else -left
+            random = (MULTIPLIER * random + INCREMENT) % MODULUS
+            away = 4.0 * random / MODULUS - 2.0
+            scratch.old_stages[offset(ctx, i // 8) + lanes * d + i % 8] += away * left
     stages, values = ctx.stages, ctx.values
     ctx.stages, ctx.values = scratch.old_stages, scratch.base
     evaluate(ctx)
