@@ -150,11 +150,8 @@ class Gauss(MethodBase):
             atol=self.atol,
         )  # fmt: skip
 
-    def accepts(self, problem: Problem) -> str | None:
-        """Accept every system; with reversible steps or in double-double those with certain formulas."""
-        return self._refusal(problem.system)
-
-    def _refusal(self, system: System) -> str | None:
+    def refuses(self, system: System) -> str | None:
+        """Refuse none; with reversible steps or in double-double those without certain formulas."""
         if self.precision != "double":
             return self._lacking(system)
         if self.steps is None:
@@ -184,8 +181,6 @@ class Gauss(MethodBase):
 
     def compile(self, system: System) -> Program:
         """Compile as `HBVM.compile` does, Poisson systems like any other."""
-        if (refusal := self._refusal(system)) is not None:
-            raise InputError(refusal)
         if self.precision != "double" and self.h is not None:
             from integrators.extended.program import DoubleDoubleProgram
 

@@ -227,10 +227,6 @@ class HBVM(MethodBase):
         """Order of convergence, 2s; ``None`` where s is chosen."""
         return None if self.s is None else 2 * self.s
 
-    def accepts(self, problem: Problem) -> str | None:
-        """Accept every system; Poisson ones by fixed-point iteration, with a projection one with energy."""
-        return self._refusal(problem.system)
-
     def _nodes(self, system: System) -> int | None:
         """Return k, ``None`` where it is chosen together with s."""
         return nodes_of(system, self.s) if self.k is None and self.s is not None else self.k
@@ -269,7 +265,8 @@ class HBVM(MethodBase):
         names = ("max_step", "breakpoints", "max_steps", "atol")
         return {name: value for name, value in self.options().items() if name in names}
 
-    def _refusal(self, system: System) -> str | None:
+    def refuses(self, system: System) -> str | None:
+        """Refuse Poisson systems but for fixed-point iteration, and with a projection one without energy."""
         if self.projection and (why := _not_projected(system)):
             return f"projection={self.projection!r} {why}; leave it out."
         kept = "a Poisson system's energy" if system.kind == "poisson" else "constraints"
@@ -282,8 +279,6 @@ class HBVM(MethodBase):
 
     def compile(self, system: System) -> Program:
         """Compile the vector field of ``system``, and the kernel if this machine has not yet."""
-        if (refusal := self._refusal(system)) is not None:
-            raise InputError(refusal)
         from integrators.kernel.program import compiled  # numba is for those who integrate
 
         return compiled(self, system)

@@ -9,8 +9,7 @@ import numpy as np
 from integrators.peers import load
 from integrators.protocol import Array, cite
 from integrators.stepping import FixedStep, March
-from problems.errors import InputError
-from problems.problem import Problem, System
+from problems.problem import System
 
 Type = Literal[
     "Verlet", "FR", "Yo4", "Yo6", "Yo8", "Yos6", "M2", "M4", "EFRL", "PEFRL", "VEFRL",
@@ -68,10 +67,6 @@ class Composition(FixedStep):
         """Of the force in a step: one in each map."""
         return len(_sequence(self.type, 1.0)._sequence)
 
-    def accepts(self, problem: Problem) -> str | None:
-        """Say why a problem is not taken."""
-        return self.refuses(problem.system)
-
     def refuses(self, system: System) -> str | None:
         """Return None for H = sum of c p^2/2 + V(q, t), else the reason."""
         if system.separable:
@@ -80,8 +75,6 @@ class Composition(FixedStep):
 
     def march(self, system: System) -> March:
         """Return what takes steps: pyhamsys' own loop over the compiled maps."""
-        if why := self.refuses(system):
-            raise InputError(f"{self!r} cannot integrate {system.name}: {why}")
         chi, adjoint = maps(system, self.type)
         sequences: dict[float, Any] = {}  # by the length of a step
 

@@ -13,8 +13,7 @@ from integrators.options import Count, NotNegative
 from integrators.peers import load
 from integrators.protocol import Array, cite
 from integrators.stepping import FixedStep, March
-from problems.errors import InputError
-from problems.problem import Problem, System
+from problems.problem import System
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -51,10 +50,6 @@ class Yoshida4(FixedStep):
     evaluations = 6  # each of its steps of the velocity Verlet method has two
     citation = cite("Yoshida1990", "RolimSalesEtAl2025")
 
-    def accepts(self, problem: Problem) -> str | None:
-        """Say why a problem is not taken."""
-        return self.refuses(problem.system)
-
     def refuses(self, system: System) -> str | None:
         """Return None for H = sum of c p^2/2 + V(q), else the reason."""
         if not system.separable:
@@ -63,7 +58,6 @@ class Yoshida4(FixedStep):
 
     def march(self, system: System) -> March:
         """Return what takes steps: the library's own."""
-        _check(self, system)
         one_step, dof = _step("yoshida_4th_step"), system.dof or 0
         import numba
 
@@ -119,10 +113,6 @@ class ImplicitMidpoint(FixedStep):
     order = 2
     citation = cite("RolimSalesEtAl2025")
 
-    def accepts(self, problem: Problem) -> str | None:
-        """Say why a problem is not taken."""
-        return self.refuses(problem.system)
-
     def refuses(self, system: System) -> str | None:
         """Return None for a Hamiltonian without explicit time, else the reason."""
         if system.kind != "hamiltonian":
@@ -133,7 +123,6 @@ class ImplicitMidpoint(FixedStep):
 
     def march(self, system: System) -> March:
         """Return what takes steps: the library's own."""
-        _check(self, system)
         one_step, dof = _step("implicit_midpoint_step"), system.dof or 0
         import numba
 
@@ -219,8 +208,3 @@ def _with_time(system: System) -> str | None:
     if "energy" in system.invariants:
         return None
     return "its functions of q and p take no time, but this Hamiltonian depends on it."
-
-
-def _check(method: Yoshida4 | ImplicitMidpoint, system: System) -> None:
-    if why := method.refuses(system):
-        raise InputError(f"{method!r} cannot integrate {system.name}: {why}")

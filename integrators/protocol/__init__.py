@@ -12,8 +12,8 @@ For a method with a fixed step size derive from `integrators.stepping.FixedStep`
    ``__post_init__``, after that of the base, and raise `problems.errors.InputError`.
 2. Set the class attributes ``library`` (the package that does the work), ``citation`` (how its authors ask
    to be cited) and ``order`` (``None`` where the order varies with the tolerance).
-3. ``accepts(problem)`` returns ``None``, or a sentence on why the method cannot integrate it. Omit it if the
-   method accepts every system.
+3. ``accepts(problem)`` returns ``None``, or a sentence on why the method cannot integrate it. Where the
+   system alone decides, define ``refuses(system)`` instead. Omit both if the method accepts every system.
 4. ``compile(system)`` does all compilation, imports the library (raising
    `problems.errors.MissingLibraryError`) and returns a `Program`, which knows the seconds that this took.
    Parameters are run-time values.

@@ -158,6 +158,10 @@ class MethodBase(CheckedOptions):
 
     def accepts(self, problem: Problem) -> str | None:
         """Return ``None`` if the method can integrate ``problem`` (the default), else the reason."""
+        return self.refuses(problem.system)
+
+    def refuses(self, system: System) -> str | None:
+        """Return the reason why ``compile`` refuses ``system``, or ``None`` (the default)."""
         return None
 
     def caveat(self, problem: Problem) -> str | None:
@@ -186,7 +190,7 @@ class MethodBase(CheckedOptions):
 
 
 def _of_a_system(compile_: Callable[[Any, System], Program]) -> Callable[[Any, System], Program]:
-    """Return a method's ``compile`` that refuses what is no system."""
+    """Return a method's ``compile`` that refuses what is no system, and what the method refuses."""
 
     @wraps(compile_)
     def checking(method: Any, system: System) -> Program:
@@ -197,11 +201,13 @@ def _of_a_system(compile_: Callable[[Any, System], Program]) -> Callable[[Any, S
 
 
 def check_system(method: MethodBase, system: System) -> None:
-    """Raise `problems.errors.InputError` unless ``system`` is one, which ``method`` is to be compiled for."""
+    """Raise `problems.errors.InputError` unless ``system`` is one that ``method`` can be compiled for."""
     if not isinstance(system, System):
         raise InputError(
             f"{type(method).__name__}.compile takes a system, such as problem.system, not {shown(system)}."
         )
+    if (reason := method.refuses(system)) is not None:
+        raise InputError(f"{method!r} cannot integrate {system.name}: {reason}")
 
 
 def check_problem(problem: Problem, method: MethodBase) -> None:

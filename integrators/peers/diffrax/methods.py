@@ -31,13 +31,9 @@ class DiffraxMethod(MethodBase):
     to_end = "end"
     citation = cite("Kidger2021")
 
-    def accepts(self, problem: Problem) -> str | None:
-        """Return None, or why not."""
-        return self.refuses(problem.system) if problem.system.traced else UNTRACED
-
     def refuses(self, system: System) -> str | None:
-        """Return why the method cannot integrate ``system``, or None."""
-        return None
+        """Refuse what is not traced."""
+        return None if system.traced else UNTRACED
 
     def caveat(self, problem: Problem) -> str | None:
         """Say that XLA's contractions break a symmetry that rounding would keep."""
@@ -82,8 +78,8 @@ class SemiImplicitEuler(_FixedMethod):
 
     def refuses(self, system: System) -> str | None:
         """Return None for H = sum of c p^2/2 + V(q, t), else the reason."""
-        if system.separable:
-            return None
+        if system.separable or not system.traced:
+            return super().refuses(system)
         return (
             "it needs a separable Hamiltonian, H = sum of c p^2/2 + V(q, t), to take q' from p and p' from q."
         )

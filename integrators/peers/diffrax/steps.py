@@ -13,7 +13,6 @@ from integrators.protocol import Array, MethodBase, Status, Trajectories
 from integrators.refusals import check_batch, check_times
 from integrators.running.watchdog import STALL_STEPS, StallDetector, stall_detector
 from integrators.stepping import FixedStepper, ProgramBase, RestorableStepper, StepperBase
-from problems.errors import InputError
 from problems.problem import System
 
 
@@ -26,9 +25,6 @@ class DiffraxProgram(ProgramBase):
 
     def __init__(self, system: System, method: MethodBase):
         super().__init__(system, method)
-        reason = self.method.refuses(system)
-        if reason is not None:
-            raise InputError(f"{method!r} cannot integrate {system.name}: {reason}")
         load("diffrax", "diffrax", "jax")
         from integrators.peers.diffrax import solve
 

@@ -37,7 +37,7 @@ class _Permutation:
 class CentralMethod(FixedMethod):
     """What REBOUND's methods for bodies about a dominant one share."""
 
-    def refuses(self, system: System, par: Array) -> str | None:
+    def refuses(self, system: System, par: Array | None = None) -> str | None:
         """Return why not: it needs at least two gravitating bodies."""
         if system.bodies is None:
             return "it needs gravitating bodies, and the system declares none."
@@ -133,7 +133,7 @@ class WHFast(CentralMethod):
         if self.corrector2 and not jacobi:
             raise InputError('WHFast has corrector2=True in coordinates="jacobi" only.')
 
-    def refuses(self, system: System, par: Array) -> str | None:
+    def refuses(self, system: System, par: Array | None = None) -> str | None:
         """Return why not: it needs gravitating bodies, as many as ``body_order`` has."""
         if reason := super().refuses(system, par):
             return reason

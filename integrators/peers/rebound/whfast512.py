@@ -55,7 +55,7 @@ class WHFast512(FixedMethod):
     citation = cite("ReinLiu2012", "ReinTamayo2015", "ReinTamayoBrown2019", "WisdomHolman1991")
     family = "wisdom-holman"
 
-    def refuses(self, system: System, par: Array) -> str | None:
+    def refuses(self, system: System, par: Array | None = None) -> str | None:
         """Return why not: too many bodies, none, or a processor without AVX-512."""
         if system.bodies is None:
             return "it needs gravitating bodies, and the system declares none."
