@@ -15,8 +15,26 @@ rule does not apply to the method. `check_method` runs them all;
 from collections.abc import Callable
 
 from integrators.protocol import MethodBase
-from integrators.testing.capabilities import CHECK_OF
-from integrators.testing.checkpoints import refuses_other_checkpoints
+from integrators.testing.capabilities import (
+    a_destination_leaves_the_samples_alone,
+    adjoints_are_what_tangents_say,
+    batches_along_are_single_trajectories,
+    batches_are_single_trajectories,
+    batches_find_the_events_of_single_trajectories,
+    comes_back_when_it_is_stopped,
+    events_may_change_the_state,
+    finds_events_beside_its_steps,
+    is_the_hbvm_that_it_names,
+    keeps_the_error_of_a_user_s_function,
+    pairs_hold_twice_the_digits,
+    prepared_batches_are_batches,
+    samplings_are_as_stated,
+    shared_steps_are_the_same,
+    tangents_follow_and_change_nothing,
+    the_size_of_a_piece_is_a_count,
+    threads_change_no_bits,
+)
+from integrators.testing.checkpoints import checkpoints_continue_bit_for_bit, refuses_other_checkpoints
 from integrators.testing.convergence import measured_order
 from integrators.testing.description import (
     accepts_gives_a_reason,
@@ -67,13 +85,30 @@ CHECKS: tuple[Check, ...] = (
     repeats_itself,
     pieces_equal_the_whole,
     samples_leave_the_steps_alone,
+    checkpoints_continue_bit_for_bit,
     refuses_other_checkpoints,
     energy_stays_sane,
     samplings_work_or_are_refused,
     refuses_bad_times,
     refuses_bad_states,
     failure_is_a_status,
-    *CHECK_OF.values(),
+    samplings_are_as_stated,
+    a_destination_leaves_the_samples_alone,
+    keeps_the_error_of_a_user_s_function,
+    comes_back_when_it_is_stopped,
+    finds_events_beside_its_steps,
+    events_may_change_the_state,
+    batches_along_are_single_trajectories,
+    batches_find_the_events_of_single_trajectories,
+    batches_are_single_trajectories,
+    prepared_batches_are_batches,
+    shared_steps_are_the_same,
+    threads_change_no_bits,
+    the_size_of_a_piece_is_a_count,
+    tangents_follow_and_change_nothing,
+    adjoints_are_what_tangents_say,
+    pairs_hold_twice_the_digits,
+    is_the_hbvm_that_it_names,
 )
 
 
