@@ -118,27 +118,21 @@ def make_method(text: str) -> MethodBase:
     spec = parse_spec(text)
     try:
         if ":" in spec.name:
-            return of_study(spec.name, "METHODS")(**spec.arguments)
+            return _of_study(spec.name)(**spec.arguments)
         return integrators.registry.create(spec.name, **spec.arguments)
     except (InputError, ImportError) as error:
         raise InputError(f"{spec}: {error}") from None
 
 
-def of_study(place: str, table: str) -> Any:
-    """Return what a module of `hbvm_bench.studies` offers: ``"paper.report:compute"`` of a table in it.
-
-    Raises
-    ------
-    problems.errors.InputError
-        If there is no such module with this table, or no such name in it.
-    """
+def _of_study(place: str) -> type[MethodBase]:
+    """Return a method of a module of `hbvm_bench.studies`, as ``"peers.alone:Taylor"``."""
     study, _, name = place.rpartition(":")
     try:
-        known = getattr(import_module(f"hbvm_bench.studies.{study}"), table)
+        known = import_module(f"hbvm_bench.studies.{study}").METHODS
     except (ModuleNotFoundError, AttributeError):
-        raise InputError(f"there is no study {study!r} with {table.lower()} of its own.") from None
+        raise InputError(f"there is no study {study!r} with methods of its own.") from None
     if name not in known:
-        raise unknown(f"name in the {table.lower()} of {study}", name, known)
+        raise unknown(f"name in the methods of {study}", name, known)
     return known[name]
 
 

@@ -4,8 +4,6 @@ The series are::
 
     chaos.megno       MEGNO at the end, shape (1,)
     chaos.exponent    the largest exponent in 1/time, and both ends of its 95 % interval, shape (3,)
-
-A change here, or in what this module imports, makes stored cases that ask for them stale, and no others.
 """
 
 from collections.abc import Callable

@@ -11,7 +11,7 @@ The series are::
                                  128 bits, and these ends
 
 Errors, their growth and metrics are pure functions of this; see `hbvm_bench.measure.reading`. A change
-here, or in what this module imports, makes every stored integration stale; a change there none.
+here makes every stored integration stale; a change there none.
 """
 
 from dataclasses import replace
@@ -144,7 +144,7 @@ def ensemble(problem: Problem, program: Program, asked: Ensemble) -> tuple[Resul
 
 def _ends(problem: Problem, index: NDArray[np.intp], starts: Array, par: Array) -> Series:
     """Return the 128-bit ends of a few trajectories, one row each; nothing without heyoka."""
-    from hbvm_bench.reference import solutions  # as the numbers of no other case depend on it
+    from hbvm_bench.reference import solutions  # few cases ask for it
 
     span = np.array([problem.t0, problem.t_end])
     rows: list[list[Decimal]] = []

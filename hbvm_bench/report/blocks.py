@@ -139,7 +139,7 @@ def missing_cases(results: Results) -> list[Notice]:
     return [
         Notice(
             f"{len(missing)} of {len(run.index.ids)} cases have no result yet",
-            f"({run.index.campaign.title or run.index.campaign.name}). To run them: `{run.command}`",
+            f"({run.index.campaign.title or run.index.campaign.name}). To run them: `{run.index.command}`",
         )
         for run in results.runs
         if (missing := results.missing(run))

@@ -33,7 +33,7 @@ def joined(store: Store, before: Path) -> list[Store]:
     records = reading.records(store)
     if not before.is_file() or not records:
         return [store]
-    kind, again = machine.kind(_machine(records)), {record.case.problem for record in records}
+    kind, again = machine.kind(StoredRun.machine_of(records)), {record.case.problem for record in records}
     runs = []
     for old in Store(before).runs():
         if old.index().campaign.name != store.index().campaign.name:
@@ -41,7 +41,7 @@ def joined(store: Store, before: Path) -> list[Store]:
                 f"{str(before)!r} has results of {old.index().campaign.name!r}; give another place."
             )
         left = [record for record in old.records() if record.case.problem not in again]
-        kept = old.records() if machine.kind(_machine(old.records())) != kind else left
+        kept = old.records() if machine.kind(StoredRun.machine_of(old.records())) != kind else left
         if kept:
             runs.append(old if len(kept) == len(old.records()) else _with_records(old, kept))
     return [*runs, store]
@@ -54,7 +54,3 @@ def _with_records(store: Store, records: Sequence[Record]) -> Store:
     for record in records:
         part.save(record, store.packed_series(record.id))
     return part
-
-
-def _machine(records: Sequence[Record]) -> dict[str, str | int]:
-    return StoredRun.machine_of(records)

@@ -33,8 +33,7 @@ REFERENCE_SUBSET = (
 
 RULES_TEXT = f"""
 Every integrator has the same initial conditions, to the last bit, and receives the same vector field, written
-down
-once as a Hamiltonian; REBOUND, which computes gravity itself, receives the same bodies.
+down once as a Hamiltonian; REBOUND, which computes gravity itself, receives the same bodies.
 
 The settings were declared in the campaign file before the run. How many each method has, and
 where they come from (chosen by the campaign's author, defaults, the authors' advice, a publication, a use

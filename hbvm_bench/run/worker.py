@@ -176,7 +176,7 @@ def _chaos(resolved: Resolved) -> tuple[dict[str, str], Series]:
     """Return the indicators of chaos that a case asks for, and why one is missing."""
     if not resolved.case.checks.chaos:
         return {}, {}
-    from hbvm_bench.measure import chaos  # as the numbers of no other case depend on it
+    from hbvm_bench.measure import chaos  # few cases ask for it
 
     return chaos.beside(resolved.problem, resolved.method)
 

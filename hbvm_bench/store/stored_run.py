@@ -32,8 +32,3 @@ class StoredRun(msgspec.Struct, frozen=True, kw_only=True):
         """Return where records were timed, or else measured."""
         timed = [record.timing.machine for record in records if record.timing is not None]
         return (timed or [record.machine for record in records])[0]
-
-    @property
-    def command(self) -> str:
-        """How to run it again."""
-        return self.index.command

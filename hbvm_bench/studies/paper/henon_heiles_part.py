@@ -31,9 +31,8 @@ PROBLEM = (
     "The paper integrates to t = 50,000 with h = 1 from a point whose energy is “very close to” "
     "1/6; it does not say which. Here: (q₁, q₂) = ({:g}, {:g}), momentum at an angle of "
     f"{{:g}} rad, H₀ = 1/6 − {GAP:g}. The motion is chaotic, so the last bit of the initial condition "
-    f"decides when Gauss loses the orbit: {NEIGHBOURS} were tried that "
-    "differ in the last bits of one momentum, and the one drawn (number {}) is "
-    "the one that escapes nearest to the paper's time."
+    f"decides when Gauss loses the orbit: {NEIGHBOURS} were tried that differ in the last bits of one "
+    "momentum, and the one drawn (number {}) is the one that escapes nearest to the paper's time."
 )
 
 
@@ -90,20 +89,17 @@ def _claims(results: PartResults) -> list[Claim]:
         Claim(
             "Gauss of order four with h = 1 lets the orbit escape",
             "t ≃ 7000",
-            f"{len(gone['gauss'])} of {starts} neighbouring initial conditions escape before t = 50,000, "
-            "the first at "
-            f"{min(gone['gauss'], default=np.nan):.0f}, half of all by {middle:,.0f}; the one drawn at "
-            f"{number(gauss.left)}",
+            f"{len(gone['gauss'])} of {starts} neighbouring initial conditions escape before t = 50,000, the "
+            f"first at {min(gone['gauss'], default=np.nan):.0f}, half of all by {middle:,.0f}; the one drawn "
+            f"at {number(gauss.left)}",
             "holds" if gauss.left is not None else "no",
         ),
         Claim(
             "Under HBVM(4,2) the orbit is in the triangle at all times",
             "50,000 points",
             f"{len(hbvm.t) - 1:,} points, {hbvm.outside} outside; {len(gone['hbvm'])} of the neighbouring "
-            f"initial conditions and {left['hbvm']} of {escaped['hbvm'].size} other initial conditions "
-            "and energies "
-            "leave, where "
-            f"under Gauss {left['gauss']} do",
+            f"initial conditions and {left['hbvm']} of {escaped['hbvm'].size} other initial conditions and "
+            f"energies leave, where under Gauss {left['gauss']} do",
             "holds" if not (hbvm.left or hbvm.outside or gone["hbvm"] or left["hbvm"]) else "no",
         ),
         Claim(
@@ -155,10 +151,9 @@ def _step_table(steps: Mapping[str, Sequence[StepRow]]) -> Table:
         ("h", *("leave", "the first at", "agrees until t") * 2),
         [(f"{a.h:g}", *cells(a), *cells(b)) for a, b in zip(steps["gauss"], steps["hbvm"], strict=True)],
         f"{experiment.STEP_STARTS} neighbouring initial conditions, followed to t = {T_END:,.0f}; a step "
-        "whose equations "
-        "find no solution counts as leaving. Agrees: time up to which the first of them is within "
-        f"{experiment.AGREES:g} of the reference solution. Conserving the energy keeps the orbit inside; an "
-        "accurate orbit needs a smaller step with either method.",
+        "whose equations find no solution counts as leaving. Agrees: time up to which the first of them is "
+        f"within {experiment.AGREES:g} of the reference solution. Conserving the energy keeps the orbit "
+        "inside; an accurate orbit needs a smaller step with either method.",
         words=(),
         key="henon-heiles-steps",
         groups=(("", 1), ("Gauss, s = 2", 3), ("HBVM(4,2)", 3)),
@@ -268,9 +263,8 @@ def fates(figure: Figure, times: Mapping[str, Sequence[float | None]]) -> Said:
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
     return (
         "The same initial condition except for the last bits of one momentum. The motion is chaotic, so "
-        "the last bit "
-        "decides when Gauss lets the orbit out; the paper's single escape time is one draw from this "
-        "distribution. Under HBVM none leaves.",
+        "the last bit decides when Gauss lets the orbit out; the paper's single escape time is one draw from "
+        "this distribution. Under HBVM none leaves.",
         "; ".join(summary),
     )
 

@@ -20,23 +20,14 @@ from integrators.protocol import Array, MethodBase
 from problems.catalogue.period_annulus import C_STAR, H_STAR, P1, P2
 
 from .experiments import period_annulus as experiment
-from .experiments.period_annulus import (
-    DRAWN,
-    NODES,
-    PRINTED,
-    SPAN,
-    Edge,
-    Path,
-    energy,
-)
+from .experiments.period_annulus import DRAWN, NODES, PRINTED, SPAN, Edge, Path, energy
 
 PROBLEM = (
     "A planar system of degree five with a centre in the origin; its periodic orbits end at a loop through "
     "the saddle P₁. The paper looks for the edge by bisection on the segment from the origin to Q = (0, 1), "
     "which judges each point by whether its numerical orbit departs within 2500 units of time, down to "
-    "an interval of "
-    "2⁻⁵². (The printed step 2 lets the segment end in P₁; it has to be Q.) An orbit departs when |q| or |p| "
-    "exceeds 1. The exact edge is at c* = 0.37570559292634522367."
+    "an interval of 2⁻⁵². (The printed step 2 lets the segment end in P₁; it has to be Q.) An orbit departs "
+    "when |q| or |p| exceeds 1. The exact edge is at c* = 0.37570559292634522367."
 )
 LONG_SPAN = (
     "Why the HBVM entries are a few units in the last place off over an interval of 2500, and exact over "
@@ -80,10 +71,7 @@ def _blocks(results: PartResults) -> list[Maker]:
         ("Figure 1", level_curves),
         ("Figure 2", lambda: closeup(results["drawn"])),
         ("the period", lambda: periods(results["periods"])),
-        (
-            "the fates near the edge",
-            lambda: fates(results.each("fates", FATE_METHODS)),
-        ),
+        ("the fates near the edge", lambda: fates(results.each("fates", FATE_METHODS))),
     ]
 
 
@@ -196,8 +184,8 @@ def _limit_table(cells: Mapping[Key, Mapping[str, Edge]], limits: Mapping[Key, t
         rows,
         "The nearest point whose orbit departs: when, and by how much round-off has raised its H by "
         "then, in units of H*. That rise is the error of the entry. Over an interval of 100 there are "
-        "three revolutions at most, "
-        f"and what is left is the spacing of the doubles at c*, which is {number(spacing)} in H/H*.",
+        f"three revolutions at most, and what is left is the spacing of the doubles at c*, which "
+        f"is {number(spacing)} in H/H*.",
         words=(),
         key="table-1-limit",
         groups=(("", 3), ("HBVM(k, s), interval 2500", 3), ("interval 100", 1)),

@@ -76,8 +76,7 @@ def lost_words(times: Sequence[float | None]) -> str:
         )
     return (
         f"Of {len(times)} initial conditions that differ in the last bits of e, {len(lost)} lose the "
-        "planetoid, the "
-        f"first at t = {lost[0]:.0f}, the last at {lost[-1]:.0f}."
+        f"planetoid, the first at t = {lost[0]:.0f}, the last at {lost[-1]:.0f}."
     )
 
 

@@ -272,8 +272,7 @@ def _plainly(results: PartResults) -> str:
         f"direction of the ellipses, which turn by {result.turn:.1f} degrees per revolution, the angular "
         "momentum, and the planetoid's phase: after a few hundred units of time its height is unrelated "
         "to the exact one. The method is not symplectic either. A higher order with a smaller step gets "
-        "all "
-        f"of it right: HBVM(16,8) with h = 1/8 has z at t = 1500 to {off}, for {share:.2f} "
+        f"all of it right: HBVM(16,8) with h = 1/8 has z at t = 1500 to {off}, for {share:.2f} "
         "times the right-hand-side evaluations of the paper's run."
     )
 
