@@ -10,8 +10,7 @@ import numpy as np
 from hbvm_bench.studies.constraints.equations import Equations, refusal
 from integrators.options import Share
 from integrators.peers import load
-from integrators.peers.sundials import SUNDIALS
-from integrators.protocol import Array, MethodBase, Status
+from integrators.protocol import Array, MethodBase, Status, cite
 from integrators.stepping import ProgramBase, StepperBase
 from problems import Constrained, targets
 from problems.problem import Problem, System
@@ -34,7 +33,7 @@ class IDA(MethodBase):
 
     rtol: Share
 
-    library, family, citation = "scikit-sundae", "multistep", SUNDIALS
+    library, family, citation = "scikit-sundae", "multistep", cite("HindmarshEtAl2005")
     computes_with = ("numpy", "numba")
     built = "generic wheel; residual compiled on this machine by numba"
 
