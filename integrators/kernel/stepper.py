@@ -187,8 +187,7 @@ class HBVMStepper(ABC):
         self._begin(y, t0)
 
     def __del__(self) -> None:
-        # A search for events knows the memory too, and may live longer; an unusable start has none.
-        if self.search is None and hasattr(self, "_partial"):
+        if hasattr(self, "_partial"):  # what cannot be started has none
             self._program.give_back(self._context, self._partial)
 
     def look_for(self, sought: Sought, end: float) -> None:

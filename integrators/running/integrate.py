@@ -391,12 +391,12 @@ def _with_events(solution: Solution, search: Finder, *, keeps: bool) -> Solution
         if vectors is not None:
             ended = replace(solution, t=solution.t[:0], y=solution.y[:0], variations=vectors, t_stop=stop)
             vectors = ended.variations_at(t)
-    stats = replace(solution.stats, extra={**solution.stats.extra, "event_search": search.work()})
-    return replace(
-        solution, t=t, y=y, status=end.status, reason=end.reason, t_stop=end.stop,
-        stats=stats, events=search.hits.occurrences(), error=end.error or solution.error,
-        variations=vectors,
-    )  # fmt: skip
+    found = {
+        "t": t, "y": y, "status": end.status, "reason": end.reason, "t_stop": end.stop,
+        "events": search.hits.occurrences(), "error": end.error or solution.error, "variations": vectors,
+    }  # fmt: skip
+    solution.stats.extra = {**solution.stats.extra, "event_search": search.work()}
+    return solution_of(**(vars(solution) | found))
 
 
 def _grid(problem: Problem, times: ArrayLike | None) -> Array:

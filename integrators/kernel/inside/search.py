@@ -88,6 +88,28 @@ class Sought:
         memory.own, memory.partial = contexts
         return memory
 
+    def lent(self, contexts: tuple[Context, Context]) -> "Lent":
+        """Return memory for a search with these contexts; that of one that is over, if there is one."""
+        try:
+            lent = self._over.pop()
+        except IndexError:
+            memory = self._fresh.copy()
+            log = Log.of(memory, room_for(max(memory.dim, memory.parameters)))
+            lent = Lent(memory, memory.copy(), log)
+        else:
+            lent.memory.become(lent.begun)
+        lent.memory.own, lent.memory.partial = contexts
+        return lent
+
+    def give_back(self, lent: "Lent") -> None:
+        """Take the memory of a search that is over, for the next one; that of one is enough."""
+        if not self._over:
+            self._over.append(lent)
+
+    @cached_property
+    def _over(self) -> "list[Lent]":
+        return []
+
     @cached_property
     def _fresh(self) -> Search:
         """What `memory` copies."""
@@ -149,6 +171,25 @@ class Log:
         return cls(*map(np.concatenate, zip(*(vars(log).values() for log in logs), strict=True)))
 
 
+@dataclass(frozen=True, eq=False)
+class Lent:
+    """The memory of a search.
+
+    Attributes
+    ----------
+    memory : Search
+        With room for what it finds.
+    begun : Search
+        What that begins with.
+    log : Log
+        The room.
+    """
+
+    memory: Search
+    begun: Search
+    log: Log
+
+
 class KernelSearch:
     """Looks for events in the steps of a trajectory; satisfies `integrators.events.finder.Finder`.
 
@@ -171,10 +212,11 @@ class KernelSearch:
         self._sought = sought
         self._context, _ = contexts
         self._dim, sign = self._context.shape.dim, 1.0 if end >= self._context.t0 else -1.0
-        self._memory = memory = sought.memory(contexts)
+        self._lent = sought.lent(contexts)
+        memory, self._log = self._lent.memory, self._lent.log
+        self._memory = memory
         memory.last, memory.sign = end, sign
         self._hits = EventLog(sought.events, memory.sign, self._dim, memory.parameters)
-        self._make_room(room_for(max(self._dim, memory.parameters)))
         self.trouble: tuple[Status, str, Exception | None] | None = None
         if self._look(START) != DONE:
             error = self._error
@@ -183,8 +225,9 @@ class KernelSearch:
         self._context.events.act = int(bool(sought.actions))
         self._context.events.acted = -memory.sign * np.inf
 
-    def _make_room(self, room: int) -> None:
-        self._log = Log.of(self._memory, room)
+    def __del__(self) -> None:
+        if hasattr(self, "_lent"):
+            self._sought.give_back(self._lent)
 
     def _look(self, mode: int) -> int:
         self._memory.mode = mode
@@ -211,7 +254,7 @@ class KernelSearch:
         halted, enough = memory.halted, memory.hits > memory.room // 2
         self.hits  # noqa: B018 -- makes room
         if halted == FULL and not enough:
-            self._make_room(2 * memory.room)
+            self._log = Log.of(memory, 2 * memory.room)
         if halted in (RAISED, UNRESOLVED, UNSOLVABLE, UNDEFINED):
             self._give_up(halted)
             return not self._context.events.act  # what an action would have changed is not known any more

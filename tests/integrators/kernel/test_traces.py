@@ -78,14 +78,16 @@ def test_a_trajectory_takes_the_memory_of_one_that_is_over():
     assert len({place, second._context.address, fourth._context.address}) == 3
 
 
-def test_a_search_for_events_keeps_its_memory():
+def test_a_search_for_events_takes_the_memory_of_one_that_is_over():
     made: Any = HBVM().compile(KEPLER.system)
-    stepper = made.with_events(KEPLER, named(Event(lambda q: q[1])))(KEPLER.y0, KEPLER.par, 0.0, 10.0)
-    stepper.advance([10.0])
-    place, search = stepper._context.address, stepper.search
-    del stepper
-    assert made.start(KEPLER.y0)._context.address != place
-    assert search.hits.counts[0] > 0
+    search = made.with_events(KEPLER, named(Event(lambda q: q[1])))
+
+    def first_event(end):
+        stepper = search(KEPLER.y0, KEPLER.par, 0.0, end)
+        stepper.advance([end])
+        return stepper.search._memory.address, stepper.search.hits.occurrences()["event"].t[0]
+
+    assert first_event(10.0) == first_event(11.0)
 
 
 @pytest.mark.parametrize("method", [HBVM(), HBVM(k=8, s=4, h=0.05)], ids=repr)
