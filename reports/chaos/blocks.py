@@ -1,6 +1,6 @@
 """The page on chaos, from stored results alone: published and computed values, and the maps."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from statistics import median
@@ -19,6 +19,7 @@ from hbvm_bench.summaries.table import NONE, Table
 from integrators.dynamics.lyapunov import INTERVALS
 
 from . import exponents, figures, maps, orbits
+from .beside_pynamicalsys import ATOL, RTOL
 from .systems import SOURCES, SYSTEMS, Known, Published
 
 PIECES = 8  # of a map, for the processes to share
@@ -331,20 +332,42 @@ def _times(measured: dict[str, exponents.Measured]) -> Table:
                 off,
                 _spent(here.seconds, *load_),
                 _spent(here.heyoka_seconds, *load_),
+                NONE if here.pynamicalsys is None else f"{here.pynamicalsys[0]:.4f}",
+                NONE
+                if here.pynamicalsys_seconds is None
+                else _spent(here.pynamicalsys_seconds, *load_)
+                if here.pynamicalsys_seconds
+                else "not installed",
             )
         )
     return Table(
         "Exponents and times",
         (
             *("system", "published", "HBVM(), 95 %", "heyoka", "time span", "sum off by"),
-            *("time, HBVM()", "time, heyoka"),
+            *("time, HBVM()", "time, heyoka", "pynamicalsys", "time, pynamicalsys"),
         ),
         rows,
         f"Sum off by: the sum of the computed exponents less the {summed}. Times: median of whole runs with "
         f"all exponents, without compiling{timed}."
+        + _beside_pynamicalsys(measured.values())
         + _busy([max(here.others, here.stolen) for here in measured.values()]),
         words=(0,),
         key="exponents-times",
+    )
+
+
+def _beside_pynamicalsys(measured: Iterable[exponents.Measured]) -> str:
+    """Return how long pynamicalsys takes, relative to HBVM(); nothing where it did not run."""
+    ratios = [
+        median(here.pynamicalsys_seconds) / median(here.seconds)
+        for here in measured
+        if here.pynamicalsys_seconds
+    ]
+    if not ratios:
+        return ""
+    return (
+        f" pynamicalsys takes {min(ratios):.2g} to {max(ratios):.2g} times as long as HBVM(), with the "
+        f"tolerances of its documentation's example, rk45 with rtol={RTOL:g} and atol={ATOL:g}."
     )
 
 

@@ -1,7 +1,7 @@
 """Lyapunov exponents by HBVM's tangent vectors and by heyoka's variational equations, with times.
 
-Both sides follow the same start to the same end, make all tangent vectors orthonormal equally often, and are
-compiled before; their runs alternate in one process.
+Both follow the same start to the same end, make all tangent vectors orthonormal equally often, and are
+compiled before; their runs alternate in one process, on some systems with those of pynamicalsys.
 """
 
 import time
@@ -21,6 +21,7 @@ from integrators.protocol import Array, Status
 from problems import Problem, targets
 from problems.errors import InputError
 
+from .beside_pynamicalsys import ON, ByPynamicalsys, installed
 from .systems import SKIP, SYSTEMS
 
 METHOD = HBVM()
@@ -50,6 +51,11 @@ class Measured:
         Time of other processes, and steal time, as shares of one core's time.
     divergence : float or None
         The mean divergence of the vector field along HBVM's trajectory; ``None`` in older results.
+    pynamicalsys : ndarray or None, shape (dim,)
+        pynamicalsys' exponents.
+    pynamicalsys_seconds : list of float or None
+        Of whole runs after compiling: none where it is not installed; ``None`` for systems that it does not
+        run and in older results.
     """
 
     exponents: Array
@@ -62,6 +68,8 @@ class Measured:
     others: float
     stolen: float
     divergence: float | None = None
+    pynamicalsys: Array | None = None
+    pynamicalsys_seconds: list[float] | None = None
 
 
 def measured(name: str, share: float = 1.0, samples: int = SAMPLES) -> Measured:
@@ -84,6 +92,10 @@ def measured(name: str, share: float = 1.0, samples: int = SAMPLES) -> Measured:
     ours = partial(lyapunov, problem, METHOD, skip=SKIP)
     with machine.staying_on_a_core(), no_collection():
         runs = [("ours", ours), ("heyoka", partial(theirs.run, ours().rounds))]
+        if takes_part := name in ON and installed():
+            toolkit = ByPynamicalsys(problem)
+            toolkit.compile()
+            runs.append(("pynamicalsys", toolkit.run))
         before = busy()
         seconds = interleaved([partial(sample, *run) for run in runs], samples)
         load = load_between(before, busy())
@@ -101,6 +113,8 @@ def measured(name: str, share: float = 1.0, samples: int = SAMPLES) -> Measured:
         others=load.others if load else 0.0,
         stolen=load.steal if load else 0.0,
         divergence=mine.divergence,
+        pynamicalsys=results.get("pynamicalsys"),
+        pynamicalsys_seconds=seconds[2] if takes_part else [] if name in ON else None,
     )
 
 

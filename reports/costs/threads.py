@@ -10,6 +10,7 @@ from itertools import product
 import numpy as np
 
 from hbvm_bench.campaign.identity import make_method, make_problem
+from hbvm_bench.measure import machine
 from hbvm_bench.measure.computation import Task
 from hbvm_bench.measure.timing import Spread
 from hbvm_bench.report.document import Maker, Note
@@ -80,6 +81,8 @@ def measured(name: str, rounds: int, *, quick: bool) -> Shared:
     problems.errors.InputError
         If a second thread changes a bit of the end.
     """
+    if len(machine.cores()) < 2:
+        machine.bind([])  # all: this process may have been started while a core was kept free for timing
     large = LARGE[name]
     problem = make_problem(large.quick if quick else large.use)
     exact = finished(integrate(problem, make_method(large.reference), [problem.t_end])).y[-1]

@@ -101,6 +101,27 @@ def test_the_sum_is_compared_with_the_mean_divergence_where_that_is_not_constant
     assert report._times({"lorenz": lorenz}).rows[0][5] == "1e-12"
 
 
+@pytest.mark.parametrize(
+    ("name", "cell"), [("lorenz", "not installed"), ("thomas", NONE)], ids=["one of its systems", "another"]
+)
+def test_without_pynamicalsys_the_row_says_so(name, cell, monkeypatch):
+    monkeypatch.setattr(exponents, "installed", lambda: False)
+    here = exponents.measured(name, 0.002, 1)
+    assert here.pynamicalsys is None
+    table = report._times({name: here})
+    assert table.rows[0][-2:] == (NONE, cell)
+    assert "times as long as HBVM()" not in table.note
+
+
+def test_pynamicalsys_has_the_same_sum_of_exponents():
+    pytest.importorskip("pynamicalsys")
+    here = exponents.measured("lorenz", 0.005, 1)
+    assert here.pynamicalsys.sum() == pytest.approx(-41 / 3, abs=1e-4)  # measured: 1.3e-8
+    table = report._times({"lorenz": here})
+    assert table.rows[0][-2] == f"{here.pynamicalsys[0]:.4f}"
+    assert "times as long as HBVM()" in table.note
+
+
 def test_maps_tell_regular_from_chaotic_starts():
     (row,) = maps.henon_heiles_section([0.0], [-0.26, 0.13, 0.99], 1 / 8, 500.0)
     assert row[0] > report.figures.CHAOTIC  # measured 7.2
