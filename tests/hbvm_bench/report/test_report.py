@@ -235,9 +235,9 @@ def test_the_rules_name_the_tolerance_that_is_used():
     [
         (TimingPlan(rounds=1), ["in turn, in one round", "at least 20 ms"], ["rounds", "for this thread"]),
         (
-            TimingPlan(rounds=5, clock="thread", shortest=1e-9),
-            ["in turn, in 5 rounds", "CPU time of this thread", "one integration"],
-            ["lasts at least"],
+            TimingPlan(rounds=5, clock="thread", shortest=0.5),
+            ["in turn, in 5 rounds", "CPU time of this thread", "at least 500 ms"],
+            ["in one round"],
         ),
     ],
 )
