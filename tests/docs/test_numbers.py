@@ -102,7 +102,7 @@ README = " ".join((pages.ROOT / "README.md").read_text(encoding="utf-8").split()
 
 LOOSE = ("speed", "by energy and position error", "Outer | 1e-08, 1e-05", "WHFast512")
 README_RATIOS = [
-    ("0.28 times the time of Gauss", [LOOSE]),
+    ("0.23 times the time of Gauss", [LOOSE]),
     (
         "heyoka is faster, by a factor of 2.9 to 4.3",
         [("general", "by position error", f"(DETEST C{i}) | 1e-12", "Taylor") for i in (1, 2, 3, 4)],
