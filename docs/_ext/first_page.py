@@ -45,7 +45,7 @@ def frame(place: str) -> Frame:
 @cache
 def raced(at: str = "") -> Frame:
     """Return the ratios of the race, at the errors that its problems ask for or at several."""
-    return cost_ratio.ratios(frame("speed/race"), at, equal_settings=True)
+    return cost_ratio.ratios(frame("speed/race"), at)
 
 
 def by_width(found: Frame) -> tuple[Frame, Frame]:

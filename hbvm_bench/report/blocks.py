@@ -55,10 +55,6 @@ ALL = (
 CITE = "`hbvm-bench cite` prints how the authors of the methods ask to be cited."
 KINDS = ("chosen", "default", "recommended", "as published", "outside its domain")
 EQUAL_ERRORS = "Time of each library's fastest setting relative to the fastest of HBVM and Gauss"
-AS_MANY = (
-    "No family has more settings than those with one kind of step size: of one that declares twice as many "
-    "for a fixed and an adaptive one, every second of either kind takes part, in the order of declaration."
-)
 
 
 def cost_ratio(
@@ -67,21 +63,17 @@ def cost_ratio(
     at: str = "",
     level: str = "",
     title: str = "",
-    equal_settings: bool = False,
     no_worse: Sequence[str] = (),
-    defaults: bool = False,
 ) -> Table | None:
     """Return the time of each family relative to HBVM and Gauss; see `hbvm_bench.summaries.cost_ratio`.
 
     At one ``level`` of the errors, as the table writes it, or at all.
     """
-    found = comparing.ratios(
-        results.frame, at, equal_settings=equal_settings, no_worse=no_worse, defaults=defaults
-    )
+    found = comparing.ratios(results.frame, at, no_worse=no_worse)
     found = found[found.level == level] if level else found
     head = "" if no_worse else f"{at or 'energy, position'} ≤"
     title = title or EQUAL_ERRORS + (f", by {at}" if at else "")
-    return comparing.table(found, title, head, AS_MANY * equal_settings)
+    return comparing.table(found, title, head)
 
 
 def ratios_drawn(
@@ -90,20 +82,15 @@ def ratios_drawn(
     key: str,
     at: str = "",
     level: str = "",
-    equal_settings: bool = False,
     no_worse: Sequence[str] = (),
 ) -> Picture | None:
     """Draw the strongest other family on each problem, at one level of errors."""
-    return bars(
-        comparing.ratios(results.frame, at, equal_settings=equal_settings, no_worse=no_worse), key, level
-    )
+    return bars(comparing.ratios(results.frame, at, no_worse=no_worse), key, level)
 
 
-def fastest(
-    results: Results, *, within: Mapping[str, float] | None = None, equal_settings: bool = False
-) -> Table | None:
+def fastest(results: Results, *, within: Mapping[str, float] | None = None) -> Table | None:
     """Return the fastest setting of each family at these errors, or at those that the problems ask for."""
-    return choosing.fastest(results.frame, within, equal_settings=equal_settings)
+    return choosing.fastest(results.frame, within)
 
 
 def longer(results: Results, *, end: float, unit: str) -> Table | None:
@@ -146,15 +133,11 @@ def missing_cases(results: Results) -> list[Notice]:
     ]
 
 
-def goals_reached(results: Results, *, equal_settings: bool = False) -> Table | None:
+def goals_reached(results: Results) -> Table | None:
     """Return what the campaigns asked for, and what was measured; ``None`` where they asked for nothing."""
-    frame, verdicts = results.frame, []
-    for number, run in enumerate(results.runs):
+    verdicts = []
+    for run in results.runs:
         records = results.records if len(results.runs) == 1 else run.records
-        if equal_settings:
-            here = frame[frame.place.str.startswith(f"{number}/")]
-            families = (comparing.competing(of) for _, of in here.groupby("place", sort=False))
-            records = [record for of in families for members in of.values() for record in members]
         verdicts += goals.verdicts(run.index.campaign, records)
     return goals.table(verdicts) if verdicts else None
 

@@ -1,6 +1,6 @@
 """A page's text, ``page.md``: a jinja template in Markdown with the prose, and which blocks stand where.
 
-``{{ block("cost_ratio", "race", equal_settings=true) }}`` on a line of its own is a block, here of the
+``{{ block("cost_ratio", "race", at="position error") }}`` on a line of its own is a block, here of the
 results called ``race`` and with an option. For numbers in sentences ``frame("race")`` and ``ratios("race")``
 are data frames, of which ``latest`` leaves the processor measured last; ``value("./blocks.py:counts")`` is
 what a function of a study's own returns, ``rms("race", METHOD)`` an energy error at the end.

@@ -7,7 +7,6 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.measure import machine
 from hbvm_bench.measure.metrics import METRICS
 from hbvm_bench.measure.timing import Spread
@@ -36,9 +35,7 @@ def ratios(
     frame: Frame,
     at: str = "",
     *,
-    equal_settings: bool = False,
     no_worse: Sequence[str] = (),
-    defaults: bool = False,
 ) -> Frame:
     """Return a row for each processor, problem, level of errors and family but HBVM and Gauss.
 
@@ -53,12 +50,8 @@ def ratios(
         The cases, see `hbvm_bench.summaries.frame.cases`.
     at : {"", "position error", "energy and position error"}
         The levels of errors, see `LEVELS`; by default the errors that each problem's ``within`` asks for.
-    equal_settings : bool
-        Whether as many settings of each family take part, see `competing`.
     no_worse : sequence of str
         The errors in which HBVM and Gauss must be no worse than the family's setting, instead of a level.
-    defaults : bool
-        Whether the other families take part with their default settings only.
     """
     import pandas as pd
 
@@ -67,23 +60,22 @@ def ratios(
     frame = frame[["processor", "place", "title", "within", "side", "step_size", "record"]]
     for (processor, place), here in frame.groupby(["processor", "place"], sort=False):
         problem, within = here.title.iloc[0], here.within.iloc[0]
-        families = competing(here) if equal_settings else of_families(here)
+        families = of_families(here)
         ours = families.pop(OURS, [])
         levels = {NONE: {}} if no_worse else dict(_levels(at, within))
         for level, errors in levels.items():
             for family, records in families.items():
-                theirs = [record for record in records if not defaults or _is_default(record)]
-                row = _compared(ours, theirs, errors, no_worse)
+                row = _compared(ours, records, errors, no_worse)
                 rows.append((processor, place, problem, level, family, *row))
     found = pd.DataFrame(rows, columns=list(COLUMNS))
     found["text"] = [_text(row) for row in found.to_dict("records")]
     return found
 
 
-def table(found: Frame, title: str, level: str = "", note: str = "") -> Table | None:
+def table(found: Frame, title: str, level: str = "") -> Table | None:
     """Return `ratios` as a table, a column for each family; ``None`` where no family has a time.
 
-    ``level`` is the head of the column of levels, which have none without one; ``note`` is added below.
+    ``level`` is the head of the column of levels, which have none without one.
     """
     found = found[found.seconds.notna().groupby([found.processor, found.place, found.level]).transform("any")]
     families = [name for name, of in found.groupby("family", sort=False) if of.seconds.notna().any()]
@@ -105,9 +97,7 @@ def table(found: Frame, title: str, level: str = "", note: str = "") -> Table | 
         rows,
         "Median of the ratio within each interleaved round, in brackets its quartiles; below 1 the other "
         "library is faster. A time, alone: only this library is as accurate. –: no setting of the library is "
-        "as accurate, or it does not take the problem."
-        + f" {machine.COLUMNS}" * several
-        + f" {note}" * bool(note),
+        "as accurate, or it does not take the problem." + f" {machine.COLUMNS}" * several,
         words=(*range(len(heads) - 1),),
         key="times-at-" + (level.split(" ≤")[0].replace(", ", "-").replace(" ", "-") or "equal-errors"),
     )
@@ -122,22 +112,6 @@ def strongest(found: Frame) -> Frame:
 def of_families(here: Frame) -> dict[str, list[Record]]:
     """Return the records of one problem by family; HBVM and Gauss are one."""
     return here.groupby("side", sort=False).record.agg(list).to_dict()
-
-
-def competing(here: Frame) -> dict[str, list[Record]]:
-    """Return as many records of each family.
-
-    Of a family with a fixed and an adaptive step size, which has declared twice as many as the others, every
-    second one of either kind takes part, counted in the order of declaration.
-    """
-    kinds: dict[str, list[list[Record]]] = {}
-    for (family, _), records in here.groupby(["side", "step_size"], sort=False).record.agg(list).items():
-        kinds.setdefault(family, []).append(records)
-    single = max((len(records[0]) for records in kinds.values() if len(records) == 1), default=0)
-    every = {name: len(of) if sum(map(len, of)) > single else 1 for name, of in kinds.items()}
-    return {
-        name: [record for records in of for record in records[:: every[name]]] for name, of in kinds.items()
-    }
 
 
 def power(value: float) -> str:
@@ -206,7 +180,3 @@ def _text(row: Mapping[str, Any]) -> str:
     ends = (None if math.isnan(row[end]) else row[end] for end in ("low", "high"))
     text = ratio_text(Spread(row["ratio"], *ends))
     return f"{text.partition(' (')[0]} {row['why']}" if row["why"] else text
-
-
-def _is_default(record: Record) -> bool:
-    return record.case.settings == "default" or not parse_spec(record.case.method).arguments

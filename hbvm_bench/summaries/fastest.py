@@ -6,7 +6,7 @@ from typing import Any
 from hbvm_bench.measure.timing import Spread
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries import standings
-from hbvm_bench.summaries.cost_ratio import ENERGY, OURS, POSITION, competing, level_text, of_families
+from hbvm_bench.summaries.cost_ratio import ENERGY, OURS, POSITION, level_text, of_families
 from hbvm_bench.summaries.frame import Frame
 from hbvm_bench.summaries.goals import ratio_text
 from hbvm_bench.summaries.rows import format_metric, seconds
@@ -15,9 +15,7 @@ from hbvm_bench.summaries.table import NONE, Table
 SHOWN = (ENERGY, POSITION, "steps", "evaluations")
 
 
-def fastest(
-    frame: Frame, within: Mapping[str, float] | None = None, *, equal_settings: bool = False
-) -> Table | None:
+def fastest(frame: Frame, within: Mapping[str, float] | None = None) -> Table | None:
     """Return the fastest setting of each family and kind of step size; ``None`` where none was timed.
 
     Parameters
@@ -26,8 +24,6 @@ def fastest(
         The cases, see `hbvm_bench.summaries.frame.cases`.
     within : mapping of str to float, optional
         The errors that a setting may have at most, by metric; by default those of each problem's ``within``.
-    equal_settings : bool
-        Whether ratios are to the fastest of HBVM and Gauss among as many settings of each family.
     """
     rows: list[tuple[Any, ...]] = []
     frame = frame[["processor", "place", "title", "within", "side", "step_size", "record"]]
@@ -36,8 +32,7 @@ def fastest(
         errors = within or here.iloc[0].within
         if not errors:
             continue
-        families = competing(here) if equal_settings else of_families(here)
-        ours = standings.best(families.get(OURS, []), errors)
+        ours = standings.best(of_families(here).get(OURS, []), errors)
         for (side, steps), settings in here.groupby(["side", "step_size"], sort=False):
             best = standings.best(list(settings.record), errors)
             label = (here.iloc[0].title, *[processor] * several, level_text(errors), f"{side}, {steps}")
@@ -54,8 +49,7 @@ def fastest(
         "The fastest setting of each family",
         (*heads, "time", "energy", "position", "steps", "evaluations", "× HBVM and Gauss"),
         rows,
-        "Time: median of a run, with its quartiles. × HBVM and Gauss: over the fastest of their settings"
-        + (" that compete with the other families." if equal_settings else "."),
+        "Time: median of a run, with its quartiles. × HBVM and Gauss: over the fastest of their settings.",
         words=range(len(heads)),
         key="fastest-settings",
     )
