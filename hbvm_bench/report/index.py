@@ -24,7 +24,7 @@ from problems.errors import InputError
 
 PLAIN = "# Reports\n\n{% for name in names %}{{ entry(name) }}\n\n{% endfor %}"
 WIDTH = 560  # pixels of a figure
-LONGEST = 600  # characters of what the list says of a report
+LONGEST = 600  # characters of what the list says of a report, in whole sentences
 CHECKS = ("smoke", "outer-solar-system")  # campaigns that have no report
 
 
@@ -115,7 +115,7 @@ def _entry(folder: Path) -> str:
     title = next((line[2:].strip() for line in lines if line.startswith("# ")), folder.name)
     first = next((line for line in lines if line and line[0] not in "#|!-*<>` \t"), "")
     if len(first) > LONGEST:
-        first = first[: first.rfind(" ", 0, LONGEST)].rstrip(" ,;:") + " …"
+        first = first[: max(first.rfind(". ", 0, LONGEST), first.find(". ")) + 1] + " …"
     place = f"{folder.name}/{TEXT}"
     parts = [f"## [{title}]({place})"]
     if pictures := re.findall(r"!\[[^\]]*\]\(([^)\s]+)\)", "\n".join(lines)):

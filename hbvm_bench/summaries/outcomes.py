@@ -158,11 +158,15 @@ def shares(records: Sequence[Record]) -> tuple[str, str]:
 
 def compilations(records: Sequence[Record]) -> list[str]:
     """Return a sentence on how the times of several compilations differ, where there are several."""
-    ratios = sorted(max(times) / min(times) for record in records if len(times := by_compilation(record)) > 1)
+    ratios = sorted(
+        (max(times) / min(times), record.case.method)
+        for record in records
+        if len(times := by_compilation(record)) > 1
+    )
     if not ratios:
         return []
-    middle, most = ratios[len(ratios) // 2], ratios[-1]
-    return [f"Scatter between compilations: {middle - 1:.0%} (median), {most - 1:.0%} (largest)."]
+    (middle, _), (most, which) = ratios[len(ratios) // 2], ratios[-1]
+    return [f"Scatter between compilations: {middle - 1:.0%} (median), {most - 1:.0%} (largest, {which})."]
 
 
 def by_compilation(record: Record) -> list[float]:

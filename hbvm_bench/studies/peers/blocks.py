@@ -98,6 +98,7 @@ def counts(results: Results) -> dict[str, float]:
     ratios = [pair.ratio.median for pair in measured if pair.ratio is not None]
     return {
         "pairs": len(measured),
+        "timed": len(ratios),
         "beyond": sum(pair.beyond for pair in measured),
         "largest": max(ratios),
         "middle": median(ratios),

@@ -2,6 +2,7 @@
 
 import gc
 import time
+from itertools import chain, repeat
 from types import SimpleNamespace
 
 import numpy as np
@@ -215,7 +216,7 @@ def test_a_calibration_by_the_clock_of_the_thread_leaves_out_what_others_do():
     assert timing.calibrate(lambda: next(ticks)) == 2.0
 
 
-@pytest.mark.parametrize(("lasts", "runs", "repeats"), [(1.0, [1, 1, 1], 1), (0.01, [1, 3, 3, 3], 3)])
+@pytest.mark.parametrize(("lasts", "runs", "repeats"), [(1.0, [1, 1, 1], 1), (0.01, [1, 1, 3, 3, 3], 3)])
 def test_the_first_run_of_a_long_integration_is_its_first_sample(monkeypatch, lasts, runs, repeats):
     ran = []
     monkeypatch.setattr(timing, "calibrate", lambda clock: 0.01)
@@ -230,3 +231,17 @@ def test_the_first_run_of_a_long_integration_is_its_first_sample(monkeypatch, la
     (taken,) = timing.time_together([run], TimingPlan(rounds=3, shortest=0.02, budget=100.0), [0, 1, 2])
     assert ran == runs
     assert [round_.repeats for round_ in taken.rounds] == [repeats] * 3
+
+
+def test_what_is_loaded_at_a_first_close_encounter_is_in_no_sample(monkeypatch):
+    monkeypatch.setattr(timing, "calibrate", lambda clock: 0.01)
+    whole = chain([0.04], repeat(0.001))
+
+    class Loading(timing.SingleRun):
+        def seconds(self, repeats=1, clock=time.perf_counter):
+            spent, samples = super().seconds(repeats, clock)
+            return (next(whole) if self.t_end == 1.0 else spent), samples
+
+    run = Loading.compiled(problems.load("pendulum", t_end=1.0), Landing())
+    (taken,) = timing.time_together([run], TimingPlan(rounds=3), [0, 1, 2])
+    assert taken.samples == [0.001] * 3
