@@ -64,7 +64,8 @@ def headline() -> str:
     compared = by_width(raced())[0]
     heyoka = compared.query("family == 'Taylor'").ratio.dropna()
     whfast = compared.query("family == 'WHFast512' and problem.str.startswith('Solar')").ratio.min()
-    both, asked = by_width(defaults().query("why == ''")), defaults().problem.nunique()
+    both = by_width(defaults().query("why == ''"))
+    counts = both[0].problem.nunique(), defaults().problem.nunique()
     wide, narrow = (_between(part.ratio) for part in both)
     return (
         "**At energy errors of 1e-13 and position errors of 1e-10 to 1e-8 heyoka takes "
@@ -73,7 +74,7 @@ def headline() -> str:
         f"WHFast512 {digits(whfast)} times\n"
         f"on the eight planets. Beside `HBVM()`, without settings, heyoka takes {wide} times as long, with "
         f"AVX2 {narrow}\n"
-        f"times, on {both[0].problem.nunique()} of {asked} problems; on the others `HBVM()` is less accurate.**"
+        f"times, on {counts[0]} of {counts[1]} problems; on the others `HBVM()` is less accurate.**"
     )
 
 
