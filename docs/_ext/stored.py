@@ -32,7 +32,7 @@ class Stored:
         table : str
             Part of the line above the table: its caption or a heading; or of the head of the table.
         row : str
-            Parts of the row's cells, separated by ``|``; each must be in another cell, or be
+            Parts of the row's cells, separated by ``;``; each must be in another cell, or be
             the whole of it where it begins with ``=``.
         column : str
             The head of the column.
@@ -44,7 +44,7 @@ class Stored:
         ValueError
             If not exactly one row has these, or the cell has no number.
         """
-        wanted = [part.strip() for part in row.split("|")]
+        wanted = [part.strip() for part in row.split(";")]
         found = [
             dict(zip(head, cells, strict=True))[column]
             for above, head, rows in tables(report)

@@ -100,12 +100,12 @@ def test_a_cell_that_is_not_there_or_not_alone_is_an_error():
 README = " ".join((pages.ROOT / "README.md").read_text(encoding="utf-8").split())
 """It is read on GitHub, where nothing is inserted: its ratios are compared."""
 
-LOOSE = ("speed", "by energy and position error", "Outer | 1e-08, 1e-05", "WHFast512")
+LOOSE = ("speed", "by energy and position error", "Outer; 1e-08, 1e-05", "WHFast512")
 README_RATIOS = [
     ("0.23 times the time of Gauss", [LOOSE]),
     (
         "heyoka is faster, by a factor of 2.9 to 4.3",
-        [("general", "by position error", f"(DETEST C{i}) | 1e-12", "Taylor") for i in (1, 2, 3, 4)],
+        [("general", "by position error", f"(DETEST C{i}); 1e-12", "Taylor") for i in (1, 2, 3, 4)],
     ),
 ]
 
