@@ -10,11 +10,7 @@
   theme.addEventListener("click", () => {
     root.dataset.theme = isDark() ? "light" : "dark";
     label();
-    document.dispatchEvent(new Event("theme"));
   });
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
-    label();
-    document.dispatchEvent(new Event("theme"));
-  });
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", label);
   label();
 })();
