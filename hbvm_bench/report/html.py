@@ -13,6 +13,8 @@ from importlib.resources import files
 import msgspec
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
+from matplotlib.markers import MarkerStyle
+from matplotlib.transforms import Affine2D
 
 from hbvm_bench.measure.metrics import Metric
 from hbvm_bench.report.document import (
@@ -35,24 +37,6 @@ PLACE = "problem-"  # how the anchors of the sections of problems begin
 SCRIPTS = ("script.js", "table.js", "figures.js")
 TOGETHER, ONE_PAGE = 4, 100  # problems and rows; with more of both each problem has a page of its own
 INLINE = 150_000  # characters of drawings in the text of a page; a script unpacks the others
-# By matplotlib's name of a marker: its drawing in a box of 12 by 12 as the figures have it.
-MARKERS = {
-    "o": '<circle cx="6" cy="6" r="4.2"/>',
-    "d": '<path d="M6 1 9.2 6 6 11 2.8 6z"/>',
-    "8": '<path d="M4.1 1.4h3.8l2.7 2.7v3.8l-2.7 2.7H4.1L1.4 7.9V4.1z"/>',
-    "D": '<path d="M6 1 11 6 6 11 1 6z"/>',
-    "s": '<path d="M2 2h8v8H2z"/>',
-    "^": '<path d="M6 1.5 10.8 10H1.2z"/>',
-    "v": '<path d="M6 10.5 10.8 2H1.2z"/>',
-    "P": '<path d="M4.3 1h3.4v3.3H11v3.4H7.7V11H4.3V7.7H1V4.3h3.3z"/>',
-    "X": '<path d="M3.2 1 6 3.8 8.8 1 11 3.2 8.2 6 11 8.8 8.8 11 6 8.2 3.2 11 1 8.8 3.8 6 1 3.2z"/>',
-    "<": '<path d="M1.5 6 10 1.2v9.6z"/>',
-    ">": '<path d="M10.5 6 2 1.2v9.6z"/>',
-    "p": '<path d="M6 1 11 4.8 9 10.6H3L1 4.8z"/>',
-    "h": '<path d="M6 .8 10.5 3.4v5.2L6 11.2 1.5 8.6V3.4z"/>',
-    "H": '<path d="M3.4 1.5h5.2L11.2 6 8.6 10.5H3.4L.8 6z"/>',
-    "*": '<path d="M6 .8 7.4 4.4 11.2 4.6 8.2 7 9.3 10.8 6 8.6 2.7 10.8 3.8 7 .8 4.6 4.6 4.4z"/>',
-}
 FITTING = 9  # columns of metrics in a window of 1280 pixels; of more, these wait behind a switch
 MINOR = ("compile_seconds", "observable_end")
 DIGITS = 16  # of a double: a bar of this many digits is full
@@ -245,18 +229,26 @@ def drawing(picture: Picture, colours: Mapping[str, str]) -> Markup:
 
 def chip(look: Look) -> Markup:
     """Return the marker of a case in its colour."""
-    use = f'<use href="#k{_marker(look)}"/>'
+    use = f'<use href="#k{look.number}"/>'
     return Markup(f'<svg class="chip k{look.number}" aria-hidden="true">{use}</svg>')
 
 
 def symbols(looks: Sequence[Look]) -> Markup:
     """Return the markers once, for all rows, and the colours of the cases."""
     shapes = "".join(
-        f'<symbol id="k{number}" viewBox="0 0 12 12">{shape}</symbol>'
-        for number, shape in enumerate(MARKERS.values())
+        f'<symbol id="k{look.number}" viewBox="0 0 12 12"><path d="{shape(look.marker)}"/></symbol>'
+        for look in looks
     )
     colours = "".join(f".k{look.number}{{color:var(--m{look.number})}}" for look in looks)
     return Markup(f'<style>{colours}</style><svg class="symbols" aria-hidden="true">{shapes}</svg>')
+
+
+def shape(marker: str) -> str:
+    """Return a marker of the figures as the path of an SVG, in a box of 12 by 12."""
+    style = MarkerStyle(marker)
+    path = style.get_path().transformed(style.get_transform() + Affine2D().scale(8, -8).translate(6, 6))
+    lines = ("L".join(f"{x:.1f} {y:.1f}" for x, y in line) for line in path.to_polygons())
+    return "".join(f"M{line}z" for line in lines)
 
 
 def variables(colours: Mapping[str, str]) -> Markup:
@@ -282,7 +274,3 @@ def _within(pictures: Sequence[Picture]) -> set[str]:
             room -= len(picture.svg)
             kept.add(picture.key)
     return kept
-
-
-def _marker(look: Look) -> int:
-    return list(MARKERS).index(look.marker)
