@@ -15,9 +15,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 from numpy.typing import NDArray
 
-from hbvm_bench.report.figures.plots import numbers
 from hbvm_bench.report.figures.style import GRID, INK, MUTED, NEUTRALS, PAPER
-from hbvm_bench.summaries.table import Table
+from hbvm_bench.summaries.table import NONE, Table
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -50,6 +49,7 @@ SETTINGS: Any = {
     "path.simplify": True,
     "path.simplify_threshold": 0.4,
 }
+NUMBERS = ("line", "panel", "points", "x from", "to", "y from", "to", "last y")
 _SUPERSCRIPT = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 
 
@@ -103,8 +103,27 @@ def picture(
     text = re.sub(r"\s*<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.DOTALL)
     # Verdana is as wide as DejaVu Sans, so that labels keep their places where that is missing
     text = text.replace(f"'{FONT}'", f"'{FONT}', Verdana, sans-serif")
-    shown = numbers(figure)
-    return Picture(key, title, caption, summary, text, shown, values=values)
+    return Picture(key, title, caption, summary, text, numbers(figure), values=values)
+
+
+def numbers(figure: Figure) -> Table | None:
+    """Return a table of the lines that have a label and points; ``None`` where none has."""
+    rows = []
+    for axes in figure.axes:
+        for line in axes.get_lines():
+            label = str(line.get_label())
+            x, y = (np.asarray(values, float) for values in line.get_data())
+            if label.startswith("_") or not x.size:
+                continue
+            finite = y[np.isfinite(y)]
+            last = f"{finite[-1]:.3g}" if finite.size else NONE
+            rows.append((label, axes.get_title(loc="left"), str(x.size), *_range(x), *_range(y), last))
+    return Table("", NUMBERS, rows, words=range(2)) if rows else None
+
+
+def _range(values: NDArray[np.float64]) -> tuple[str, str]:
+    finite = values[np.isfinite(values)]
+    return (f"{finite.min():.3g}", f"{finite.max():.3g}") if finite.size else (NONE, NONE)
 
 
 def inline_svg(picture: Picture, colours: Mapping[str, str]) -> str:

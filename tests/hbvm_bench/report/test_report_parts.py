@@ -16,8 +16,7 @@ from hbvm_bench.measure.metrics import METRICS
 from hbvm_bench.report import html
 from hbvm_bench.report.blocks import all_cases
 from hbvm_bench.report.document import Details
-from hbvm_bench.report.figures.canvas import new
-from hbvm_bench.report.figures.plots import numbers
+from hbvm_bench.report.figures.canvas import new, numbers
 from hbvm_bench.report.index import CHECKS, not_measured, write_index, write_pages
 from hbvm_bench.report.markdown import markdown
 from hbvm_bench.report.page import document, gather, page_of
