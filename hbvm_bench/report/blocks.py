@@ -343,7 +343,7 @@ def run_again(results: Results) -> Section:
             "`hbvm-bench show DIRECTORY --json` prints every number with all timing samples; "
             "`hbvm-bench report DIRECTORY` draws this report again without running anything.",
             measured_on(results),
-            *provenance.facts(provenance.machines(records), provenance.versions(records)),
+            *provenance.facts(records),
         ],
         "again",
         nav="Run it again",

@@ -4,8 +4,7 @@ from collections.abc import Mapping, Sequence
 from datetime import datetime
 
 from hbvm_bench.measure import machine
-from hbvm_bench.store.records import Load, Record
-from hbvm_bench.summaries import outcomes
+from hbvm_bench.store.records import Record
 from hbvm_bench.summaries.table import Table
 from integrators.registry import libraries
 
@@ -16,12 +15,6 @@ def days(records: Sequence[Record]) -> str:
     """Return the days on which the cases ran: ``"2026-11-21"``, ``"2026-11-20 to 2026-11-21"``."""
     days_ = sorted({datetime.fromisoformat(r.finished).date().isoformat() for r in records if r.finished})
     return "" if not days_ else days_[0] if days_[0] == days_[-1] else f"{days_[0]} to {days_[-1]}"
-
-
-def measured_on(day: str, kernel: str, loads: Sequence[Load]) -> str:
-    """Say when something was measured, with which kernel, and beside what other work."""
-    beside = f" {outcomes.other_work(loads)}" if loads else ""
-    return f"Measured on {day} with the kernel {kernel[:DIGITS]}.{beside}"
 
 
 def versions(records: Sequence[Record]) -> dict[str, str]:
@@ -40,12 +33,6 @@ def processors(records: Sequence[Record]) -> list[str]:
     return machine.sentences(timing.machine for timing in timings if timing.machine)
 
 
-def machines(records: Sequence[Record]) -> dict[str, str]:
-    """Return what is known of the machine."""
-    values_of = _each_once([record.machine for record in records], " | ")
-    return {name.replace("_", " "): values for name, values in values_of.items()}
-
-
 def _each_once(all_: Sequence[Mapping[str, object]], glue: str) -> dict[str, str]:
     """Return the values by name; those that differ stand side by side."""
     values_of: dict[str, set[str]] = {}
@@ -55,11 +42,9 @@ def _each_once(all_: Sequence[Mapping[str, object]], glue: str) -> dict[str, str
     return {name: glue.join(sorted(values)) for name, values in sorted(values_of.items())}
 
 
-def facts(machine: Mapping[str, object], versions: Mapping[str, object]) -> list[Table]:
+def facts(records: Sequence[Record]) -> list[Table]:
     """Return the tables of what is known of the machine and of the libraries."""
-    tables = ((("machine", ""), machine), (("library", "version"), versions))
-    return [
-        Table("", head, [(k, str(v)) for k, v in values.items()], words=(0, 1))
-        for head, values in tables
-        if values
-    ]
+    known = _each_once([record.machine for record in records], " | ")
+    machines = [(name.replace("_", " "), values) for name, values in known.items()]
+    tables = ((("machine", ""), machines), (("library", "version"), [*versions(records).items()]))
+    return [Table("", head, rows, words=(0, 1)) for head, rows in tables if rows]

@@ -36,12 +36,6 @@ class Verdict:
     verdict: Literal["reached", "missed", "excluded", "not judged"]
     why: str  # why nothing was measured, or why it is excluded or not judged
     comparison: SettingComparison  # the cases that decide; for a goal without a peer it has only ours
-    records: Sequence[Record]  # of all cases on the problem
-
-    @property
-    def reached(self) -> bool:
-        """Whether it is."""
-        return self.verdict == "reached"
 
     @property
     def declared(self) -> str:
@@ -93,20 +87,12 @@ def is_after(date: str, other: str) -> bool:
     return date[:length] > other[:length]
 
 
-def disturbed(goal: Goal, records: Sequence[Record | None]) -> str:
-    """Return why a speed is not judged: other work while its times were taken; else ``""``."""
-    return other_work(records) if goal.metric in TIMES else ""
-
-
-def other_work(records: Sequence[Record | None]) -> str:
-    """Return why the times of cases are not judged: the share of a core of other work; else ``""``."""
+def other_work(records: Sequence[Record | None], metric: str = standings.TIME) -> str:
+    """Return why a speed of cases is not judged: the share of a core of other work; else ``""``."""
     timings = [item.timing for item in records if item is not None and item.timing is not None]
-    busiest = max(
-        (load for item in timings if (load := item.load) is not None),
-        key=lambda load: load.most,
-        default=None,
-    )
-    return f"{busiest.verdict()} during the timing" if busiest is not None and busiest.verdict() else ""
+    loads = [item.load for item in timings if item.load is not None and metric in TIMES]
+    busy = max(loads, key=lambda load: load.most).verdict() if loads else ""
+    return f"{busy} during the timing" if busy else ""
 
 
 def _judged(goal: Goal, entry: ProblemEntry, records: Sequence[Record]) -> Verdict:
@@ -118,7 +104,7 @@ def _judged(goal: Goal, entry: ProblemEntry, records: Sequence[Record]) -> Verdi
     metric, able = METRICS[goal.metric], standings.among(records, goal.method)
     ours = standings.best(able, goal.within, goal.metric)
     reached = ours is not None and (number(ours, goal.metric) or 0.0) <= goal.at
-    busy = disturbed(goal, [ours])
+    busy = other_work([ours], goal.metric)
     missing = (
         record.result.metrics[goal.metric].why for record in able if goal.metric in record.result.metrics
     )
@@ -131,7 +117,6 @@ def _judged(goal: Goal, entry: ProblemEntry, records: Sequence[Record]) -> Verdi
         verdict="not judged" if busy else "reached" if reached else "missed",
         why=next(missing, "") if ours is None else busy,
         comparison=SettingComparison(ours, None),
-        records=records,
     )
 
 
@@ -156,7 +141,7 @@ def _against(goal: Goal, entry: ProblemEntry, records: Sequence[Record], ratio: 
             if theirs is None
             else "no setting of HBVM and Gauss is as accurate"
         )
-    elif busy := disturbed(goal, [comparison.ours, comparison.theirs]):
+    elif busy := other_work([comparison.ours, comparison.theirs], goal.metric):
         verdict, why = "not judged", busy
     elif comparison.chosen_by_them:
         why = "from the rounds that chose the settings: there are no others"
@@ -170,7 +155,6 @@ def _against(goal: Goal, entry: ProblemEntry, records: Sequence[Record], ratio: 
         verdict=verdict,
         why=why,
         comparison=comparison,
-        records=records,
     )
 
 
@@ -206,13 +190,13 @@ def as_data(judged: Sequence[Verdict]) -> list[dict[str, object]]:
             "verdict": verdict.verdict,
             "why": verdict.why,
             "measured": verdict.measured,
-            **ratio_data(verdict.comparison),
+            **_ratio_data(verdict.comparison),
         }
         for verdict in judged
     ]
 
 
-def ratio_data(comparison: SettingComparison) -> dict[str, object]:
+def _ratio_data(comparison: SettingComparison) -> dict[str, object]:
     """Return a comparison as plain data for JSON."""
     low, high = (comparison.ratio.low, comparison.ratio.high) if comparison.ratio else (None, None)
     data: dict[str, object] = {
