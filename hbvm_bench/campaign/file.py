@@ -103,7 +103,7 @@ class Campaign(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             Case(
                 problem=fill(entry.use, values),
                 method=text,
-                grid=self.grid if entry.grid is None else entry.grid,
+                grid=entry.grid or self.grid,
                 settings=method.settings,
                 note=method.note,
                 checks=self.checks,

@@ -14,26 +14,21 @@ from hbvm_bench.campaign.file import (
     Campaign,
     EnsembleEntry,
     Goal,
-    Limits,
     MethodEntry,
     TimingPlan,
-    chosen,
     name_of,
 )
 from hbvm_bench.campaign.grid import Grid
-from hbvm_bench.campaign.identity import Resolved, is_ours, printed
+from hbvm_bench.campaign.identity import Resolved, is_ours
 from hbvm_bench.campaign.spec import parse_spec
-from hbvm_bench.campaign.sweep import fill
 from hbvm_bench.measure.measured import PLAIN, PREFIXES
 from hbvm_bench.measure.metrics import find
 from hbvm_bench.reference import solutions
 from hbvm_bench.summaries.goals import TIMES
 from hbvm_bench.summaries.rows import Task, grouped_by
+from hbvm_bench.summaries.standings import tasks_of
 from problems.errors import InputError, unknown
 from problems.problem import Problem
-
-LEAST = {"wall_seconds": 0.1, "compile_seconds": 0.1, "memory_gib": 0.1}
-"""Under less no case can begin: an interpreter with NumPy alone takes 0.05 GiB."""
 
 SHORTEST = 0.02  # seconds of a sample
 
@@ -46,7 +41,6 @@ def check(campaign: Campaign, cases: Sequence[Resolved]) -> None:
     problems.errors.InputError
         For the first name that nobody has, and the first number that says nothing.
     """
-    _limits(campaign.limits)
     _timing(campaign.timing)
     for method in (*campaign.methods, *(item for many in campaign.ensembles for item in many.methods)):
         _settings(method)
@@ -63,15 +57,9 @@ def check(campaign: Campaign, cases: Sequence[Resolved]) -> None:
         if entry.end is not None:
             solutions.of_end(here[name][0].problem, entry.end)
         if not campaign.quick:  # which shortens the spans and keeps the grids
-            _grid(campaign.grid if entry.grid is None else entry.grid, name, here[name])
+            _grid(entry.grid or campaign.grid, name, here[name])
     for goal in campaign.goals:
         _goal(goal, campaign, [item for name in goal.only or here for item in here[name]])
-
-
-def _limits(limits: Limits) -> None:
-    for name, least in LEAST.items():
-        if (given := getattr(limits, name)) < least:
-            raise InputError(f"{name}={given!r} of limits is too little for any case; give at least {least}.")
 
 
 def _timing(plan: TimingPlan) -> None:
@@ -85,8 +73,6 @@ def _timing(plan: TimingPlan) -> None:
 
 
 def _settings(method: MethodEntry) -> None:
-    if not method.texts:
-        raise InputError("a method with use = [] has no settings; give at least one.")
     count = len(method.texts) * math.prod(map(len, method.sweep.values()))
     for place in method.quick:
         if not 0 <= place < count:
@@ -97,8 +83,6 @@ def _settings(method: MethodEntry) -> None:
 
 
 def _ensemble(many: EnsembleEntry, problem: Problem) -> None:
-    if many.spread > 1.0:
-        raise InputError(f"spread={many.spread!r} of an ensemble is a share of the start; give at most 1.")
     for method in many.methods:
         if method.only:
             raise InputError(
@@ -130,17 +114,9 @@ def _series(page: Page, cases: Sequence[Resolved]) -> None:
 def _by_name(campaign: Campaign, cases: Sequence[Resolved]) -> dict[str, list[Resolved]]:
     """Return the cases by what a campaign calls their problems and ensembles."""
     cases_of: dict[str, list[Resolved]] = {}
-    there = [
-        (name_of(entry), Task.on(printed(fill(entry.use, values)), entry.grid or campaign.grid))
-        for entry in campaign.entries()
-        for values in chosen(entry)
-    ] + [
-        (name_of(many.entry), Task.on(printed(many.problem), ensemble=many.ensemble))
-        for many in campaign.ensembles
-    ]
     of_task = grouped_by(lambda case: Task.from_case(case.case), cases)
-    for name, task in there:  # two entries may be one task, as the spans of a quick run
-        cases_of.setdefault(name, []).extend(of_task.get(task, []))
+    for entry, task in tasks_of(campaign):  # two entries may be one task, as the spans of a quick run
+        cases_of.setdefault(name_of(entry), []).extend(of_task.get(task, []))
     return cases_of
 
 

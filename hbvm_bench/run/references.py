@@ -40,7 +40,7 @@ def make_missing(campaign: Campaign, store: Store, known: Known, tell: Callable[
                     known |= Known(references={given.key: given})
                     store.keep(text, known)
                 continue
-            grid = campaign.grid if entry.grid is None else entry.grid
+            grid = entry.grid or campaign.grid
             samples = grid.times(problem, made=known.references)
             there = solutions.find(problem, known.references)
             if there is not None and there.t.size > 1 and np.isin(there.t, samples).all():

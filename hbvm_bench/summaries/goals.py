@@ -51,8 +51,7 @@ def verdicts(campaign: Campaign, records: Sequence[Record]) -> list[Verdict]:
     return [
         _judged(goal, entry, here)
         for entry, here in standings.entries(campaign, records)
-        for goal in campaign.goals
-        if here and name_of(entry) in (goal.only or [name_of(entry)])
+        for goal in (standings.goals_of(campaign, entry) if here else ())
     ]
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from statistics import median
 
 from hbvm_bench.campaign.entries import Accuracy
-from hbvm_bench.campaign.file import Campaign, ProblemEntry, chosen, name_of
+from hbvm_bench.campaign.file import Campaign, Goal, ProblemEntry, chosen, name_of
 from hbvm_bench.campaign.identity import printed
 from hbvm_bench.campaign.sweep import fill
 from hbvm_bench.measure.timing import Spread, chooses
@@ -31,37 +31,39 @@ class SettingComparison:
 
 def entries(campaign: Campaign, records: Sequence[Record]) -> list[tuple[ProblemEntry, list[Record]]]:
     """Return the problems of a campaign, then its ensembles, each with the records of its cases."""
-    result: list[tuple[ProblemEntry, list[Record]]] = []
     tables = tasks(records)
-    for entry in campaign.entries():
-        for values in chosen(entry):
-            problem = printed(fill(entry.use, values))
-            grid = campaign.grid if entry.grid is None else entry.grid
-            result.append((entry, tables.get(Task.on(problem, grid), [])))
-    for many in campaign.ensembles:
-        task = Task.on(printed(many.problem), ensemble=many.ensemble)
-        result.append((many.entry, tables.get(task, [])))
-    return result
+    return [(entry, tables.get(task, [])) for entry, task in tasks_of(campaign)]
+
+
+def tasks_of(campaign: Campaign) -> list[tuple[ProblemEntry, Task]]:
+    """Return what the problems of a campaign and then its ensembles ask for, each with its entry."""
+    problems = [
+        (entry, Task.on(printed(fill(entry.use, values)), entry.grid or campaign.grid))
+        for entry in campaign.entries()
+        for values in chosen(entry)
+    ]
+    ensembles = [
+        (many.entry, Task.on(printed(many.problem), ensemble=many.ensemble)) for many in campaign.ensembles
+    ]
+    return problems + ensembles
 
 
 def asked(campaign: Campaign) -> dict[str, list[Accuracy]]:
     """Return the errors that a campaign asks for, by itself and by goals, by the problem as it prints."""
     return {
-        printed(fill(entry.use, values)): [
+        task.problem: [
             within
-            for within in (
-                entry.within,
-                *(
-                    goal.within
-                    for goal in campaign.goals
-                    if name_of(entry) in (goal.only or [name_of(entry)])
-                ),
-            )
+            for within in (entry.within, *(goal.within for goal in goals_of(campaign, entry)))
             if within
         ]
-        for entry in campaign.entries()
-        for values in chosen(entry)
+        for entry, task in tasks_of(campaign)
+        if task.ensemble is None
     }
+
+
+def goals_of(campaign: Campaign, entry: ProblemEntry) -> list[Goal]:
+    """Return the goals of a campaign that are about a problem."""
+    return [goal for goal in campaign.goals if not goal.only or name_of(entry) in goal.only]
 
 
 def title_of(entry: ProblemEntry) -> str:

@@ -134,13 +134,13 @@ RIGHT\n[grid]\nspacing = "log"\nfirst = nan                  => Expected `float`
 RIGHT\n[grid]\ncuont = 3                                     => unknown key 'cuont'; did you mean 'count'?
 RIGHT\n[grid]\ncount = true                                  => Expected `int | null`, got `bool`, at
 RIGHT\nlimits = 3                                            => Expected `object`, got `int`, at `limits`
-RIGHT\n[limits]\nwall_seconds = 0                            => Expected `float` > 0.0, at
-RIGHT\n[limits]\nwall_seconds = -1                           => Expected `float` > 0.0, at
+RIGHT\n[limits]\nwall_seconds = 0                            => Expected `float` >= 0.1, at
+RIGHT\n[limits]\nwall_seconds = -1                           => Expected `float` >= 0.1, at
 RIGHT\n[limits]\nwall_seconds = "a"                          => Expected `float`, got `str`, at
-RIGHT\n[limits]\nwall_seconds = nan                          => Expected `float` > 0.0, at
+RIGHT\n[limits]\nwall_seconds = nan                          => Expected `float` >= 0.1, at
 RIGHT\n[limits]\nwall_seconds = inf                          => Expected `float` <= 1e+300, at
-RIGHT\n[limits]\nmemory_gib = 0                              => Expected `float` > 0.0, at
-RIGHT\n[limits]\nmemory_gib = nan                            => Expected `float` > 0.0, at
+RIGHT\n[limits]\nmemory_gib = 0                              => Expected `float` >= 0.1, at
+RIGHT\n[limits]\nmemory_gib = nan                            => Expected `float` >= 0.1, at
 RIGHT\n[limits]\nmemory_gib = inf                            => Expected `float` <= 1e+300, at
 RIGHT\n[limits]\nmemory = 3                                  => unknown key 'memory'; did you mean
 RIGHT\n[limits]\nmemory_gib = []                             => Expected `float`, got `array`, at
@@ -165,9 +165,9 @@ RIGHT\n[checks]\nreversal = "a"                              => Expected `float`
 RIGHT\n[checks]\nreversal = nan                              => Expected `float` >= 0.0, at `checks.reversal`
 RIGHT\n[checks]\nchaos = 1                                  => Expected `bool`, got `int`, at `checks.chaos`
 RIGHT\n[checks]\nstart = 3                                   => unknown key 'start'; did you mean 'starts'?
-RIGHT\n[limits]\nmemory_gib = 1e-6                            => memory_gib=1e-06 of limits is too little for
-RIGHT\n[limits]\nwall_seconds = 1e-6                          => wall_seconds=1e-06 of limits is too little fo
-RIGHT\n[limits]\ncompile_seconds = 0.01                       => compile_seconds=0.01 of limits is too little
+RIGHT\n[limits]\nmemory_gib = 1e-6                            => Expected `float` >= 0.1, at
+RIGHT\n[limits]\nwall_seconds = 1e-6                          => Expected `float` >= 0.1, at
+RIGHT\n[limits]\ncompile_seconds = 0.01                       => Expected `float` >= 0.1, at
 RIGHT\n[grid]\nalso = [1e99]                                  => also=1e+99 of the grid of kepler lies beyond
 RIGHT\n[grid]\nalso = [-1]                                    => Expected `float` > 0.0, at `grid.also[0]`
 RIGHT\n[grid]\nstep = 1e99                                    => step=1e+99 of the grid of kepler lies beyond
@@ -176,7 +176,7 @@ PROBLEMS\nproblems = [{use = "kepler()", grid = {also = [1e9]}}] => also=1000000
 RIGHT\n[timing]\nshortest = 1e-4                              => shortest=0.0001 of timing is too short for a
 RIGHT\n[page]\nseries = ["drift.enrgy"]                      => unknown series of the campaign's cases
 RIGHT\n[page]\nseries = ["error.energy", "guard.x"]          => unknown series of the campaign's cases
-METHODS\nmethods = [{use = []}]                               => a method with use = [] has no settings; give
+METHODS\nmethods = [{use = []}]                               => Expected `array` of length >= 1, at
 METHODS\nmethods = [{use = ["HBVM()", "IAS15()"], quick = [2]}] => there is no setting 2; there are 2, counted
 METHODS\nmethods = [{use = ["HBVM()", "IAS15()"], quick = [-1]}] => there is no setting -1; there are 2, count
 name = "x"\nproblems = ["kepler()", "morse()"]\nmethods = [{use = "HBVM()", only = ["kepler"]}] => no method
@@ -209,10 +209,10 @@ RIGHT\n[[ensembles]]\nENSEMBLE\ncount = 100000000000000000000000 => the limit is
 RIGHT\n[[ensembles]]\nENSEMBLE\ncount = 10\nspread = 0       => Expected `float` > 0.0, at
 RIGHT\n[[ensembles]]\nENSEMBLE\ncount = 10\nspread = -1      => Expected `float` > 0.0, at
 RIGHT\n[[ensembles]]\nENSEMBLE\ncount = 10\nspread = nan     => Expected `float` > 0.0, at
-RIGHT\n[[ensembles]]\nENSEMBLE\ncount = 10\nspread = inf     => Expected `float` <= 1e+300, at
+RIGHT\n[[ensembles]]\nENSEMBLE\ncount = 10\nspread = inf     => Expected `float` <= 1.0, at
 RIGHT\n[[ensembles]]\nENSEMBLE\ncount = 10\nspread = "a"     => Expected `float`, got `str`, at
 RIGHT\n[[ensembles]]\nENSEMBLE\ncuont = 10                   => unknown key 'cuont'; did you mean 'count'?
-RIGHT\n[[ensembles]]\nENSEMBLE\ncount = 10\nspread = 2       => spread=2.0 of an ensemble is a share of the
+RIGHT\n[[ensembles]]\nENSEMBLE\ncount = 10\nspread = 2       => Expected `float` <= 1.0, at
 RIGHT\n[[ensembles]]\nENSEMBLE\ncount = 10\nname = "../x"    => problem name '../x' must be a file name of
 RIGHT\n[[ensembles]]\nENSEMBLE\ncount = 10\nvary = {m = 0.1} => unknown parameter of kepler 'm'
 RIGHT\n[[ensembles]]\nproblem = "kepler()"\ncount = 9\nmethods = [{use = "HBVM()", only = ["x"]}] => only=['x'
