@@ -9,7 +9,7 @@ from hbvm_bench.campaign.file import Campaign, Limits
 from hbvm_bench.campaign.identity import Resolved, resolve
 from hbvm_bench.campaign.own import NOTHING, Known
 from hbvm_bench.run.executors import Pool
-from hbvm_bench.run.task import InterruptedRunError, Request, UnfinishedRunError, execute
+from hbvm_bench.run.task import InterruptedRunError, Made, Request, UnfinishedRunError, execute
 from hbvm_bench.store.records import COMPILING, DIED, Record
 from hbvm_bench.store.store import Store
 from problems.errors import InputError
@@ -77,7 +77,7 @@ def run_accuracy(
     """
     libraries = list(dict.fromkeys(request.rows[0].library for request in requests))
     waiting = deque(sorted(requests, key=lambda request: libraries.index(request.rows[0].library)))
-    running: dict[Future[tuple[Record, bytes]], Request] = {}
+    running: dict[Future[Made], Request] = {}
     attempts: Counter[str] = Counter()
     failures: list[str] = []
     try:
@@ -95,7 +95,7 @@ def run_accuracy(
             done, _ = wait(running, timeout=PATIENCE, return_when=FIRST_COMPLETED)
             for future in done:
                 request = running.pop(future)
-                measured, series, failure = None, b"", ""
+                measured, series, failure = None, {}, ""
                 try:
                     measured, series = future.result()
                 except (InterruptedRunError, InputError, UnfinishedRunError):
@@ -119,7 +119,7 @@ def run_accuracy(
         raise UnfinishedRunError(f"{count} could not be run: {reasons}")
 
 
-def _submitted(pool: Pool, request: Request) -> Future[tuple[Record, bytes]]:
+def _submitted(pool: Pool, request: Request) -> Future[Made]:
     try:
         return pool.executor.submit(execute, request)
     except Exception as error:  # broken or shut down, each executor in its own words

@@ -116,8 +116,8 @@ class Answer(msgspec.Struct, frozen=True, kw_only=True):
         Why nothing of it can be done in this place; empty where it was.
     result : bytes
         JSON of the `Result` of the case.
-    series : bytes
-        Its arrays, as `hbvm_bench.store.arrays.encode` makes them; empty where there are none.
+    series : dict of bytes
+        Its arrays by name, as `hbvm_bench.store.arrays.packed` makes them.
     timings : bytes
         JSON of the `Timing` of each row.
     """
@@ -125,7 +125,7 @@ class Answer(msgspec.Struct, frozen=True, kw_only=True):
     leaves: bool = False
     refusal: str = ""
     result: bytes = b""
-    series: bytes = b""
+    series: dict[str, bytes] = {}
     timings: bytes = b""
 
 
@@ -144,18 +144,15 @@ def request_of(resolved: Resolved, limits: Limits) -> Request:
     return Request(rows=[row], limits=limits, beside=resolved.beside)
 
 
-def execute(request: Request) -> tuple[Record, bytes]:
+Made = tuple[Record, dict[str, bytes]]
+"""A row, whatever happens to its process, and its packed arrays by name."""
+
+
+def execute(request: Request) -> Made:
     """Measure one case in a process under hard limits.
 
     Top-level and without a directory, so that any `concurrent.futures.Executor` can run it, on this machine
     or another. The process serves the next case of the same library, too.
-
-    Returns
-    -------
-    row : Record
-        Whatever happens to the process is one, with its reason.
-    series : bytes
-        As `hbvm_bench.store.arrays.encode` makes them; empty where there are none.
 
     Raises
     ------
@@ -207,9 +204,9 @@ def stay_on(core: int) -> None:
     _thread.core = core
 
 
-def _result(ended: Ended, answer: Answer, limits: Limits) -> tuple[Result, bytes]:
-    def failed(outcome: Outcome, reason: str, status: str = "") -> tuple[Result, bytes]:
-        return Result(outcome=outcome, reason=reason, status=status), b""
+def _result(ended: Ended, answer: Answer, limits: Limits) -> tuple[Result, dict[str, bytes]]:
+    def failed(outcome: Outcome, reason: str, status: str = "") -> tuple[Result, dict[str, bytes]]:
+        return Result(outcome=outcome, reason=reason, status=status), {}
 
     if ended.cause == "timeout":
         return failed("timeout", f"did not end within {limits.wall_seconds:g} s")
@@ -224,10 +221,9 @@ def _result(ended: Ended, answer: Answer, limits: Limits) -> tuple[Result, bytes
         return failed("crashed", f"the process {ended.words}", DIED)
     try:
         result = records.decoded(answer.result, Result)
-        if answer.series:
-            arrays.decode(answer.series)
+        arrays.check(answer.series)
     except ValueError:  # msgspec's errors and bad UTF-8 are among these
-        return NO_RESULT, b""
+        return NO_RESULT, {}
     return result, answer.series
 
 

@@ -30,7 +30,7 @@ from hbvm_bench.measure.raw import Series
 from hbvm_bench.measure.timing import SingleRun, Timeable
 from hbvm_bench.run import child
 from hbvm_bench.run.task import Answer, Computation, Request
-from hbvm_bench.store.arrays import NAME, encode
+from hbvm_bench.store import arrays
 from hbvm_bench.store.records import Record, Result
 from integrators.protocol import PreparedBatches, Program, Status, offers
 from integrators.solution import Solution
@@ -109,8 +109,8 @@ def _answered(
 
 
 def _stored(result: Result, series: Series) -> Answer:
-    arrays = encode(series) if series else b""
-    return Answer(result=msgspec.json.encode(result), series=arrays, leaves=result.outcome == "crashed")
+    blobs = {name: arrays.packed(values) for name, values in series.items()}
+    return Answer(result=msgspec.json.encode(result), series=blobs, leaves=result.outcome == "crashed")
 
 
 def _difference(row: Record, here: Resolved) -> str:
@@ -145,7 +145,7 @@ def _measure(resolved: Resolved, compiled: Callable[[], None]) -> Measured:
         if reason := resolved.method.accepts(resolved.problem):
             return Result(outcome="refused", reason=reason), {}
         names = list(resolved.problem.system.invariants)
-        if bad := [name for name in names if not NAME.fullmatch(name)]:
+        if bad := [name for name in names if not arrays.NAME.fullmatch(name)]:
             reason = f"the invariant's name {bad[0]!r} can be no file name"
             return Result(outcome="refused", reason=reason), {}
         grid = resolved.times

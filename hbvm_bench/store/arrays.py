@@ -1,11 +1,10 @@
-"""Arrays as bytes: compressed ``.npy`` files without pickles; several by name, as a worker returns them."""
+"""Arrays as bytes: compressed ``.npy`` files without pickles."""
 
 import io
 import re
 import zlib
 from collections.abc import Mapping
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -52,22 +51,15 @@ def unpacked(data: bytes) -> NDArray[np.float64]:
     return values.reshape(shape, order="F" if fortran else "C").copy()
 
 
-def encode(arrays: Mapping[str, NDArray[np.float64]]) -> bytes:
-    """Return arrays by name as bytes."""
-    return msgspec.msgpack.encode({name: packed(values) for name, values in arrays.items()})
-
-
-def decode(content: bytes) -> dict[str, bytes]:
-    """Return the bytes of each array, all of which have been read to the end.
+def check(blobs: Mapping[str, bytes]) -> None:
+    """Read the arrays of some bytes to the end, by their names.
 
     Raises
     ------
     ValueError
-        If a name or an array is none, or if there is none at all.
+        If a name or an array is none.
     """
-    blobs = msgspec.msgpack.decode(content, type=dict[str, bytes])
-    if not blobs or not all(map(NAME.fullmatch, blobs)):
+    if not all(map(NAME.fullmatch, blobs)):
         raise ValueError("an array has no name, or one that is none")
     for data in blobs.values():
         unpacked(data)
-    return blobs

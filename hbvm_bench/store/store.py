@@ -165,7 +165,7 @@ class Store:
     def save(
         self,
         record: Record,
-        arrays: Mapping[str, NDArray[np.float64]] | Mapping[str, bytes] | bytes | None = None,
+        arrays: Mapping[str, NDArray[np.float64]] | Mapping[str, bytes] | None = None,
         *,
         compress: bool = True,
     ) -> None:
@@ -173,8 +173,6 @@ class Store:
 
         Arrays are not compressed for a file that is compressed as a whole.
         """
-        if isinstance(arrays, bytes):
-            arrays = packing.decode(arrays) if arrays else None
         with self._writing() as database:
             self._put(database, record)
             if arrays is not None:
