@@ -15,9 +15,8 @@ from hbvm_bench.report.page import page_in
 from hbvm_bench.report.template import NAME, environment
 from hbvm_bench.report.write import TEXT, write
 from hbvm_bench.store.files import write_all
-from hbvm_bench.store.records import Record
+from hbvm_bench.store.records import Record, machine_of
 from hbvm_bench.store.store import PACKED, Store
-from hbvm_bench.store.stored_run import StoredRun
 from hbvm_bench.summaries import outcomes
 from hbvm_bench.summaries.table import Table
 from problems.errors import InputError
@@ -98,7 +97,7 @@ def not_measured(directory: Path) -> list[str]:
 
 
 def _measured(records: Sequence[Record]) -> tuple[str, ...]:
-    described = StoredRun.machine_of(records)
+    described = machine_of(records)
     names = dict.fromkeys((str(described.get("processor", "unknown")), machine.kind(described)))
     kernels = sorted({record.kernel[: provenance.DIGITS] for record in records if record.kernel})
     return (

@@ -27,8 +27,7 @@ from hbvm_bench.report.curves import PREFIX, curves
 from hbvm_bench.report.document import Block, Document
 from hbvm_bench.report.figures.style import Look, looks
 from hbvm_bench.store.records import Record
-from hbvm_bench.store.store import PACKED, Store, progress
-from hbvm_bench.store.stored_run import StoredRun
+from hbvm_bench.store.store import PACKED, Store, StoredRun, progress
 from hbvm_bench.summaries import cost_ratio, growth
 from hbvm_bench.summaries import frame as frames
 from hbvm_bench.summaries.frame import Frame

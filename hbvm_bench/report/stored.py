@@ -5,9 +5,8 @@ from pathlib import Path
 
 from hbvm_bench.measure import machine, reading
 from hbvm_bench.report.page import Results
-from hbvm_bench.store.records import Record
+from hbvm_bench.store.records import Record, machine_of
 from hbvm_bench.store.store import Store
-from hbvm_bench.store.stored_run import StoredRun
 from problems.errors import InputError
 
 
@@ -33,7 +32,7 @@ def joined(store: Store, before: Path) -> list[Store]:
     records = reading.records(store)
     if not before.is_file() or not records:
         return [store]
-    kind, again = machine.kind(StoredRun.machine_of(records)), {record.case.problem for record in records}
+    kind, again = machine.kind(machine_of(records)), {record.case.problem for record in records}
     runs = []
     for old in Store(before).runs():
         if old.index().campaign.name != store.index().campaign.name:
@@ -41,7 +40,7 @@ def joined(store: Store, before: Path) -> list[Store]:
                 f"{str(before)!r} has results of {old.index().campaign.name!r}; give another place."
             )
         left = [record for record in old.records() if record.case.problem not in again]
-        kept = old.records() if machine.kind(StoredRun.machine_of(old.records())) != kind else left
+        kept = old.records() if machine.kind(machine_of(old.records())) != kind else left
         if kept:
             runs.append(old if len(kept) == len(old.records()) else _with_records(old, kept))
     return [*runs, store]

@@ -5,6 +5,7 @@ Not-a-number and infinity never enter a record: a value that does not exist is
 """
 
 import math
+from collections.abc import Sequence
 from contextlib import suppress
 from datetime import datetime
 from statistics import median, quantiles
@@ -363,3 +364,9 @@ class Record(msgspec.Struct, frozen=True, kw_only=True):
     def __post_init__(self) -> None:
         if self.finished:
             datetime.fromisoformat(self.finished)
+
+
+def machine_of(records: Sequence[Record]) -> dict[str, str | int]:
+    """Return where records were timed, or else measured."""
+    timed = [record.timing.machine for record in records if record.timing is not None]
+    return (timed or [record.machine for record in records])[0]

@@ -85,6 +85,13 @@ class Index(msgspec.Struct, frozen=True, kw_only=True):
         return list(zip(self.ids, self.cases or self.campaign.cases(), strict=True))
 
 
+class StoredRun(msgspec.Struct, frozen=True, kw_only=True):
+    """A run as pages are made of it: what was asked for, and the results in the order of the campaign."""
+
+    index: Index
+    records: list[Record]
+
+
 class Store:
     """The rows and arrays of one run in a file; see the module's text.
 

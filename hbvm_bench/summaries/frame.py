@@ -14,9 +14,8 @@ from hbvm_bench.campaign.identity import fixed_step, make_method
 from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.measure import machine, reading
 from hbvm_bench.measure.metrics import METRICS
-from hbvm_bench.store.records import Record, Timing, Value
-from hbvm_bench.store.store import Store
-from hbvm_bench.store.stored_run import StoredRun
+from hbvm_bench.store.records import Record, Timing, Value, machine_of
+from hbvm_bench.store.store import Store, StoredRun
 from hbvm_bench.summaries import standings
 from hbvm_bench.summaries.points import family_of, is_hbvm_or_gauss
 from problems.errors import InputError, unknown
@@ -61,7 +60,7 @@ def cases(runs: Sequence[StoredRun]) -> Frame:
     rows, records, asked = [], [], []
     for number, run in enumerate(runs):
         campaign = run.index.campaign
-        kind = machine.words(machine.kind(run.machine)) if run.records else ""
+        kind = machine.words(machine.kind(machine_of(run.records))) if run.records else ""
         for place, (entry, here) in enumerate(standings.entries(campaign, run.records)):
             for record in here:
                 family = family_of(record)

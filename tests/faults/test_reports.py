@@ -8,8 +8,7 @@ import msgspec
 import pytest
 
 from hbvm_bench import cli
-from hbvm_bench.store.store import PACKED, Store
-from hbvm_bench.store.stored_run import StoredRun
+from hbvm_bench.store.store import PACKED, Store, StoredRun
 from problems.errors import InputError
 from tests.hbvm_bench.made_up_run import archived
 from tests.hbvm_bench.studies import made_up_studies

@@ -17,8 +17,7 @@ from hbvm_bench.commands.publishing import report_on
 from hbvm_bench.measure import machine, processor
 from hbvm_bench.run import timing_pass
 from hbvm_bench.store.records import Timing
-from hbvm_bench.store.store import PACKED, Store, opened
-from hbvm_bench.store.stored_run import StoredRun
+from hbvm_bench.store.store import PACKED, Store, StoredRun, opened
 from problems.errors import InputError
 from tests.hbvm_bench.made_up_run import archived, record, timed
 from tests.hbvm_bench.studies import made_up_studies

@@ -23,8 +23,7 @@ from hbvm_bench.report.page import document, gather, page_of
 from hbvm_bench.report.write import TEXT, rendered
 from hbvm_bench.store.merge import merge
 from hbvm_bench.store.records import Load, Result, Timing
-from hbvm_bench.store.store import Index, Store
-from hbvm_bench.store.stored_run import StoredRun
+from hbvm_bench.store.store import Index, Store, StoredRun
 from problems.errors import InputError
 from tests.hbvm_bench import made_up_run
 

@@ -7,8 +7,7 @@ from hbvm_bench.campaign.file import load
 from hbvm_bench.campaign.identity import is_ours, make_problem, resolve
 from hbvm_bench.campaign.shorter import chosen, quick_run, with_rounds
 from hbvm_bench.store.records import Counters, Load, Timing
-from hbvm_bench.store.store import Index, Store
-from hbvm_bench.store.stored_run import StoredRun
+from hbvm_bench.store.store import Index, Store, StoredRun
 from tests.hbvm_bench import made_up_run
 from tests.hbvm_bench.made_up_run import timed
 

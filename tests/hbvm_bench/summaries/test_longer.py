@@ -4,8 +4,7 @@ import pytest
 
 from hbvm_bench.campaign.file import load
 from hbvm_bench.campaign.identity import resolve
-from hbvm_bench.store.store import Index
-from hbvm_bench.store.stored_run import StoredRun
+from hbvm_bench.store.store import Index, StoredRun
 from hbvm_bench.summaries import frame
 from hbvm_bench.summaries.longer import longer
 from tests.hbvm_bench import made_up_run
