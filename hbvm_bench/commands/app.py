@@ -104,9 +104,8 @@ def list_(
     ] = "",
 ) -> None:
     """List the problems, the methods with their options, the metrics and the campaigns."""
-    terminal_ = terminal.console()
     for table in listing.tables(kind):
-        terminal_.print(table)
+        terminal.print_table(table)
 
 
 @app.command()

@@ -3,22 +3,18 @@
 import dataclasses
 import inspect
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
-
-from rich.table import Table
-from rich.text import Text
 
 import integrators.registry
 import problems
 from hbvm_bench.campaign.file import load, shipped
 from hbvm_bench.campaign.identity import version_of
 from hbvm_bench.measure.metrics import METRICS
-from hbvm_bench.report import terminal
 from hbvm_bench.store.records import Record
 from hbvm_bench.store.store import Index
 from hbvm_bench.summaries import export, goals
-from hbvm_bench.summaries.table import NONE
+from hbvm_bench.summaries.table import NONE, Table
 from problems.errors import unknown
 
 
@@ -54,32 +50,18 @@ def as_json(index: Index, records: Sequence[Record]) -> dict[str, Any]:
     }
 
 
-def _table(title: str, heads: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
-    table = terminal.empty(title)
-    for i, head in enumerate(heads):
-        table.add_column(head, no_wrap=i == 0)
-    for row in rows:
-        table.add_row(*map(Text, row))
-    return table
-
-
 def _problems() -> Table:
-    loaded = [(name, problems.load(name)) for name in problems.names()]
     rows = [
-        (
-            _call(name, problem.arguments),
-            str(problem.system.dim),
-            ", ".join(problem.system.invariants),
-            problem.title or "",
-        )
-        for name, problem in loaded
+        (repr(problem), str(problem.system.dim), ", ".join(problem.system.invariants), problem.title or "")
+        for problem in map(problems.load, problems.names())
     ]
-    return _table("problems", ("problem", "dimension", "invariants", "description"), rows)
+    head = ("problem", "dimension", "invariants", "description")
+    return Table("problems", head, rows, words=(0, 2, 3))
 
 
 def _methods() -> Table:
-    rows = map(_method, integrators.registry.names())
-    return _table("methods", ("method", "library", "version", "description"), rows)
+    rows = [*map(_method, integrators.registry.names())]
+    return Table("methods", ("method", "library", "version", "description"), rows, words=range(4))
 
 
 def _method(name: str) -> tuple[str, ...]:
@@ -94,13 +76,13 @@ def _method(name: str) -> tuple[str, ...]:
 
 def _metrics() -> Table:
     rows = [(m.key, m.unit or NONE, m.better or NONE, m.description) for m in METRICS.values()]
-    return _table("metrics", ("metric", "unit", "better", "description"), rows)
+    return Table("metrics", ("metric", "unit", "better", "description"), rows, words=range(4))
 
 
 def _campaigns() -> Table:
     loaded = [(name, load(name)) for name in shipped()]
     rows = [(name, str(len(campaign.cases())), campaign.title) for name, campaign in loaded]
-    return _table("campaigns", ("campaign", "cases", "description"), rows)
+    return Table("campaigns", ("campaign", "cases", "description"), rows, words=(0, 2))
 
 
 def _call(name: str, arguments: Mapping[str, Any]) -> str:
