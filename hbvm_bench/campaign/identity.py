@@ -53,8 +53,6 @@ class Resolved:
         Made from the case's text; its library may still be missing.
     id : str
         sha256 in hexadecimal.
-    key : dict
-        What was hashed.
     times : ndarray
         The sampling times.
     beside : own.Beside
@@ -65,7 +63,6 @@ class Resolved:
     problem: Problem
     method: MethodBase
     id: str
-    key: dict[str, Any]
     times: NDArray[np.float64]
     beside: own.Beside
 
@@ -88,7 +85,7 @@ def resolve(case: Case, known: own.Known = own.NOTHING) -> Resolved:
     key = case_key(canonical, problem, method, times)
     text = json.dumps(key, sort_keys=True, separators=(",", ":"), ensure_ascii=True, allow_nan=False)
     number = hashlib.sha256(text.encode()).hexdigest()
-    return Resolved(canonical, problem, method, number, key, times, known.beside(problem))
+    return Resolved(canonical, problem, method, number, times, known.beside(problem))
 
 
 def make_problem(text: str, known: own.Known = own.NOTHING) -> Problem:
@@ -182,12 +179,6 @@ def fixed_step(method: MethodBase) -> float | None:
     """Return the length that all steps of a method have; ``None`` where it chooses its steps."""
     tolerances = (getattr(method, name, None) for name in TOLERANCES)
     return None if any(tolerances) else getattr(method, "h", None)
-
-
-def of_method(method: MethodBase) -> dict[str, Any]:
-    """Return what a record says of a method: its role, library and order."""
-    role = "ours" if is_ours(method) else "peer"
-    return {"role": role, "library": method.library, "order": method.order}
 
 
 def is_ours(method: MethodBase) -> bool:

@@ -310,7 +310,7 @@ def _run(
     timing: bool,
 ) -> None:
     child.stopping.clear()
-    missing = [case for case in cases if not loop.is_kept(case, store, campaign.limits)]
+    missing = [case for case in cases if not loop.is_done(store.load(case.id), campaign.limits)]
     with Live() as live:
         try:
             live.phase(f"measuring {pool.where}", len(missing), len(cases) - len(missing))

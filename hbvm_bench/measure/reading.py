@@ -33,10 +33,10 @@ def up_to_date(store: Store, record: Record, known: Known = NOTHING) -> Record:
     if record.result.outcome not in ("ok", "stalled") or record.result.metrics:
         return record
     try:
-        reference = solutions.digest(make_problem(record.case.problem, known), known.references)
+        reference = solutions.find_file(make_problem(record.case.problem, known), known.references)
     except InputError:  # of a plugin that is not here
         return record
-    content = msgspec.json.encode([reference, record])
+    content = msgspec.json.encode(["" if reference is None else reference.digest, record])
     arrays = (part for named in store.packed_series(record.id).items() for part in named)
     key = kept.key("reading", rule(), content, *arrays)
     if (there := kept.get(key)) is not None:
@@ -48,9 +48,7 @@ def up_to_date(store: Store, record: Record, known: Known = NOTHING) -> Record:
             f"the arrays of {record.case.method} on {record.case.problem} cannot be read "
             f"({type(error).__name__}: {error}); {store.again()}."
         ) from error
-    result = reread.result
-    reading = Reading(metrics=result.metrics, violation=result.violation, growth=result.growth)
-    kept.put(key, msgspec.json.encode(reading))
+    kept.put(key, msgspec.json.encode(msgspec.convert(reread.result, Reading, from_attributes=True)))
     return reread
 
 
@@ -90,9 +88,7 @@ def drawn(record: Record, series: Series, known: Known = NOTHING) -> Series:
 
 def with_reading(record: Record, reading: Reading) -> Record:
     """Return a record with a reading in the place of its own."""
-    result = msgspec.structs.replace(
-        record.result, metrics=reading.metrics, violation=reading.violation, growth=reading.growth
-    )
+    result = msgspec.structs.replace(record.result, **msgspec.structs.asdict(reading))
     return msgspec.structs.replace(record, result=result)
 
 

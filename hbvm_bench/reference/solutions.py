@@ -145,12 +145,6 @@ def find_file(problem: Problem, made: References = NONE) -> ReferenceFile | None
     return next((file_ for file_ in fitting if end in file_.t), fitting[0] if fitting else None)
 
 
-def digest(problem: Problem, made: References = NONE) -> str:
-    """Return the SHA-256 of the times and states of a problem's reference; ``""`` where it has none."""
-    file = find_file(problem, made)
-    return "" if file is None else file.digest
-
-
 def decode(text: str) -> ReferenceFile:
     """Return a reference from its text; see `encode`.
 

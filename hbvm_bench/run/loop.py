@@ -48,11 +48,6 @@ def died(record: Record) -> bool:
     return record.result.status == DIED
 
 
-def is_kept(resolved: Resolved, store: Store, limits: Limits) -> bool:
-    """Whether the store has a case as a run under these limits leaves it."""
-    return is_done(store.load(resolved.id), limits)
-
-
 def run_accuracy(
     requests: Sequence[Request],
     store: Store,

@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from hbvm_bench.campaign import folder, own
 from hbvm_bench.campaign.file import Case, Limits, TimingPlan
-from hbvm_bench.campaign.identity import Resolved, is_ours, kernel_digest, of_method, versions_of
+from hbvm_bench.campaign.identity import Resolved, is_ours, kernel_digest, versions_of
 from hbvm_bench.measure import machine
 from hbvm_bench.measure.computation import Task
 from hbvm_bench.run import child
@@ -135,7 +135,9 @@ def request_of(resolved: Resolved, limits: Limits) -> Request:
     row = Record(
         id=resolved.id,
         case=resolved.case,
-        **of_method(method),
+        role="ours" if is_ours(method) else "peer",
+        library=method.library,
+        order=method.order,
         result=NO_RESULT,
         limits=limits,
         versions=versions_of(method),

@@ -18,6 +18,7 @@ from hbvm_bench.run.task import NO_RESULT, Request, timed
 from hbvm_bench.store.records import Record, Timing
 from hbvm_bench.store.store import Store
 from hbvm_bench.summaries import front
+from hbvm_bench.summaries.rows import status_of
 
 Machine = dict[str, str | int]
 Group = list[tuple[Resolved, Record]]
@@ -80,11 +81,6 @@ def outdated(cases: Sequence[Resolved], store: Store, plan: TimingPlan) -> int:
     return sum(bool(timing.rounds) and timing.plan != plan for timing in timings)
 
 
-def timeable(record: Record) -> bool:
-    """Whether a case reached its end, so that its time has a meaning."""
-    return record.result.outcome == "ok" and record.result.status == "finished"
-
-
 def _missing(cases: Sequence[Resolved], store: Store, plan: TimingPlan, here: Machine) -> list[Group]:
     """Return whom one process times together.
 
@@ -93,7 +89,7 @@ def _missing(cases: Sequence[Resolved], store: Store, plan: TimingPlan, here: Ma
     """
     groups: dict[object, Group] = {}
     for case in cases if plan.rounds else ():
-        if (record := store.load(case.id)) is not None and timeable(record):
+        if (record := store.load(case.id)) is not None and status_of(record) == "ok":
             groups.setdefault((case.case.problem, case.case.ensemble), []).append((case, record))
     return [group for group in groups.values() if not _is_timed([record for _, record in group], plan, here)]
 

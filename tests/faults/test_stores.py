@@ -20,7 +20,7 @@ from hbvm_bench import cli
 from hbvm_bench.campaign.file import Campaign, Case, Limits, MethodEntry
 from hbvm_bench.campaign.identity import resolve
 from hbvm_bench.measure import raw
-from hbvm_bench.run.loop import is_kept
+from hbvm_bench.run.loop import is_done
 from hbvm_bench.store.files import write_all
 from hbvm_bench.store.records import Compile, Record, Timing, TimingRound
 from hbvm_bench.store.store import Index, Store
@@ -158,7 +158,7 @@ def test_an_index_that_is_none_is_one_sentence(here, capsys, text):
 def test_a_damaged_row_is_one_sentence_and_its_case_runs_again(here, capsys, damage, command):
     edit(here, "record", damage.do)
     refused(capsys, command, f"{re.escape(SOUND)} on .* is damaged: .*{damage.says}.*run its campaign again")
-    assert not is_kept(resolve(Case(problem=PROBLEM, method=SOUND)), Store(Path("run")), Limits())
+    assert not is_done(Store(Path("run")).load(resolve(Case(problem=PROBLEM, method=SOUND)).id), Limits())
 
 
 @pytest.mark.parametrize("text", TEXTS, ids=["deep", "cut", "no text", "a list"])

@@ -181,7 +181,7 @@ def test_another_plan_takes_all_times_again_and_integrates_nothing(toys, store):
         (*one.samples, *one.calibration) for one in before.timing.rounds
     }
     assert now.finished == before.finished
-    assert loop.is_kept(one, store, GENEROUS)
+    assert loop.is_done(store.load(one.id), GENEROUS)
 
 
 def test_a_timing_that_fails_says_why(toys, store):
