@@ -18,11 +18,6 @@ from problems.errors import InputError, unknown
 PLACE = re.compile(r"\./(?P<file>[A-Za-z_]\w*)\.py:(?P<name>[A-Za-z]\w*)")
 
 
-def is_beside(place: str) -> bool:
-    """Whether a name is that of something in a Python file beside the campaign's."""
-    return place.startswith("./")
-
-
 def named(place: str, folder: Path | None) -> Any:
     """Return what ``./blocks.py:table`` names: ``table`` of ``blocks.py`` in a folder, which is run.
 

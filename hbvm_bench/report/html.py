@@ -27,7 +27,7 @@ from hbvm_bench.report.document import (
     is_call,
     pieces,
 )
-from hbvm_bench.report.figures.canvas import Picture, inline_svg
+from hbvm_bench.report.figures.canvas import Picture
 from hbvm_bench.report.figures.style import DARK_NEUTRALS, NEUTRALS, Look
 from hbvm_bench.summaries.points import family_of
 from hbvm_bench.summaries.rows import Cell, Row, seconds
@@ -221,10 +221,23 @@ def _power(match: re.Match[str]) -> str:
 
 
 def drawing(picture: Picture, colours: Mapping[str, str]) -> Markup:
-    """Return the SVG of a figure for the page, at sizes at which its text can be read."""
-    width = float(re.findall(r'viewBox="0 0 ([\d.]+)', picture.svg)[0])
-    size = f"max-width:{width * ENLARGED:.0f}px;min-width:{width * LEAST:.0f}px"
-    return Markup(inline_svg(picture, colours).replace("<svg ", f'<svg style="{size}" ', 1))
+    """Return the SVG of a figure in the colours of the page, at sizes at which its text can be read."""
+    variables = {**NEUTRALS, **colours}
+    text = re.sub(
+        r"#[0-9a-f]{6}\b",
+        lambda match: f"var({variables[match[0]]})" if match[0] in variables else match[0],
+        picture.svg,
+    )
+    width, height = map(float, re.findall(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', text)[0])
+    head = (
+        f'<svg style="max-width:{width * ENLARGED:.0f}px;min-width:{width * LEAST:.0f}px" role="img" '
+        f'aria-labelledby="{picture.key}-title {picture.key}-desc" viewBox="0 0 {width:g} {height:g}" '
+        'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink">'
+    )
+    # ids are unique in a file; in a page they must be unique among all its figures
+    text = re.sub(r'\bid="', f'id="{picture.key}-', text)
+    text = re.sub(r'(xlink:href="|url\()#', rf"\1#{picture.key}-", text)
+    return Markup(re.sub(r"<svg[^>]*>", lambda _: head, text, count=1))
 
 
 def chip(look: Look) -> Markup:

@@ -98,7 +98,7 @@ def find(name: str, study: Path | None = None) -> BlockMaker:
     problems.errors.InputError
         If there is none, with the nearest names.
     """
-    if folder.is_beside(name):
+    if name.startswith("./"):
         return folder.named(name, study)
     known = {
         key: item

@@ -101,7 +101,7 @@ def section(
         *attempt((f"the reference of {task.problem}", partial(_reference, problem, known))),
         *([Details(f"{len(missing)} cases on this problem have no result yet", [unrun])] if missing else []),
         *_figures(here, series, number, brief=brief),
-        *attempt((f"the shortcomings on {task.problem}", partial(_shortcomings, records, number))),
+        Section("Shortcomings of HBVM and Gauss", [Items(words.shortcomings(records))], f"wrong-{number}"),
     ]
     title = ranked(task, records, problem, sampled).title
     nav = "Figures" * (number == 1)
@@ -136,10 +136,6 @@ def _other_invariants(cases: Sequence[Drawn]) -> list[OverTime]:
         caption = "Relative error, or absolute where the value at the start is 0; a vector's 2-norm."
         specs.append(OverTime(key, title, f"error of {said}", name.removeprefix(PREFIX), caption))
     return specs
-
-
-def _shortcomings(records: Sequence[Record], number: int) -> Section:
-    return Section("Shortcomings of HBVM and Gauss", [Items(words.shortcomings(records))], f"wrong-{number}")
 
 
 def _reference(problem: Problem, known: Known) -> Items | None:

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
+import msgspec
 from rich import box
 from rich.console import Console, Group, RenderableType
 from rich.table import Table as RichTable
@@ -10,7 +11,6 @@ from rich.text import Text
 
 from hbvm_bench.campaign.file import Campaign
 from hbvm_bench.measure.metrics import Metric
-from hbvm_bench.store.files import json_of
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries import goals
 from hbvm_bench.summaries.rows import Row, at_once, columns, grouped, numbers, rows, tasks
@@ -38,7 +38,7 @@ def console(*, stderr: bool = False) -> Console:
 
 def print_json(value: Any) -> None:
     """Print a value for programs."""
-    print(json_of(value).decode(), end="")
+    print(msgspec.json.format(msgspec.json.encode(value), indent=1).decode())
 
 
 def empty(title: str) -> RichTable:

@@ -6,9 +6,6 @@ import threading
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
-from typing import Any
-
-import msgspec
 
 from problems.errors import InputError
 
@@ -32,11 +29,6 @@ def atomic(path: Path) -> Iterator[Path]:
         if isinstance(error, OSError):
             raise InputError(f"cannot write {str(path)!r}: {error.strerror or error}.") from error
         raise
-
-
-def json_of(value: Any) -> bytes:
-    """Return a value as JSON for people: indented, and ended by a line end."""
-    return msgspec.json.format(msgspec.json.encode(value), indent=1) + b"\n"
 
 
 def spreadsheet_text(cell: str) -> str:

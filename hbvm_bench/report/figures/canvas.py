@@ -3,7 +3,7 @@
 import io
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import wraps
 from typing import Any, ParamSpec, TypeVar
@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 from numpy.typing import NDArray
 
-from hbvm_bench.report.figures.style import GRID, INK, MUTED, NEUTRALS, PAPER
+from hbvm_bench.report.figures.style import GRID, INK, MUTED, PAPER
 from hbvm_bench.summaries.table import NONE, Table
 
 P = ParamSpec("P")
@@ -124,26 +124,6 @@ def numbers(figure: Figure) -> Table | None:
 def _range(values: NDArray[np.float64]) -> tuple[str, str]:
     finite = values[np.isfinite(values)]
     return (f"{finite.min():.3g}", f"{finite.max():.3g}") if finite.size else (NONE, NONE)
-
-
-def inline_svg(picture: Picture, colours: Mapping[str, str]) -> str:
-    """Return the SVG for a page; ``colours`` are its variables by colour, and it has the page's size."""
-    variables = {**NEUTRALS, **colours}
-    text = re.sub(
-        r"#[0-9a-f]{6}\b",
-        lambda match: f"var({variables[match[0]]})" if match[0] in variables else match[0],
-        picture.svg,
-    )
-    width, height = re.findall(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', text)[0]
-    head = (
-        f'<svg role="img" aria-labelledby="{picture.key}-title {picture.key}-desc" '
-        f'viewBox="0 0 {width} {height}" xmlns="http://www.w3.org/2000/svg" '
-        'xmlns:xlink="http://www.w3.org/1999/xlink">'
-    )
-    # ids are unique in a file; in a page they must be unique among all its figures
-    text = re.sub(r'\bid="', f'id="{picture.key}-', text)
-    text = re.sub(r'(xlink:href="|url\()#', rf"\1#{picture.key}-", text)
-    return re.sub(r"<svg[^>]*>", lambda _: head, text, count=1)
 
 
 def new(width: float, height: float) -> Figure:

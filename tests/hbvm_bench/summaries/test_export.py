@@ -3,12 +3,12 @@
 import csv
 import json
 
+import msgspec
 import pytest
 from msgspec.structs import replace
 
 from hbvm_bench.campaign.entries import Checks, Ensemble
 from hbvm_bench.campaign.grid import Grid
-from hbvm_bench.store.files import json_of
 from hbvm_bench.summaries import export
 from hbvm_bench.summaries.frame import case, framed
 from tests.hbvm_bench import made_up_run
@@ -27,7 +27,7 @@ def records():
 
 
 def test_json_has_the_grid_the_checks_and_the_ensemble_with_their_defaults(records):
-    one, small, large = json.loads(json_of(export.as_json(records)))["cases"]
+    one, small, large = json.loads(msgspec.json.encode(export.as_json(records)))["cases"]
     assert one["grid"]["step"] == 25.0
     assert one["grid"]["spacing"] == small["grid"]["spacing"] == "equal"
     assert (one["checks"], one["ensemble"]) == (
