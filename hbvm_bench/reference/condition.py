@@ -3,13 +3,10 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from integrators import Gauss
-from integrators.protocol import Status
+from integrators.protocol import Array, Status
 from problems.problem import Problem
-
-Array = NDArray[np.float64]
 
 METHOD = Gauss(s=12, tol=1e-14)
 """Symplectic, and so is the derivative of its steps, whose inverse then needs no solving."""

@@ -6,13 +6,11 @@ A page is drawn from these alone, be it of a run or of what lies beside a report
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hbvm_bench.campaign.own import NOTHING, Known
 from hbvm_bench.measure import drift, reading
 from hbvm_bench.store.records import Record
-
-Array = NDArray[np.float64]
+from integrators.protocol import Array
 
 PREFIX = "curve."
 GROWTH = PREFIX + "growth"

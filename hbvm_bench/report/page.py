@@ -15,13 +15,11 @@ from inspect import isfunction
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from hbvm_bench.campaign import folder
 from hbvm_bench.campaign.file import STUDY, Case, shipped
 from hbvm_bench.campaign.own import NOTHING, Known
 from hbvm_bench.measure import reading
+from hbvm_bench.measure.measured import Series
 from hbvm_bench.report import template
 from hbvm_bench.report.curves import PREFIX, curves
 from hbvm_bench.report.document import Block, Document
@@ -34,7 +32,6 @@ from hbvm_bench.summaries.frame import Frame
 from hbvm_bench.summaries.points import family_of
 from problems.errors import InputError, unknown
 
-Series = dict[str, NDArray[np.float64]]
 Stores = Sequence[Store]
 Made = Block | Sequence[Block] | None
 BlockMaker = Callable[..., Made]

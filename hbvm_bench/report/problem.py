@@ -6,7 +6,6 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hbvm_bench.campaign.file import Case
 from hbvm_bench.campaign.identity import make_problem
@@ -25,9 +24,8 @@ from hbvm_bench.summaries.frame import Frame
 from hbvm_bench.summaries.points import number as number_of
 from hbvm_bench.summaries.points import short_name
 from hbvm_bench.summaries.rows import Task, at_once, grouped, rows
+from integrators.protocol import Array
 from problems.problem import Problem
-
-Array = NDArray[np.float64]
 
 OVER_TIME = (
     OverTime("energy", "Energy error over time", "energy error, |H − H₀| / |H₀|", "error.energy", ""),

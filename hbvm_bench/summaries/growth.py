@@ -6,9 +6,9 @@ from statistics import median
 
 import numpy as np
 from msgspec.structs import replace
-from numpy.typing import NDArray
 
 from hbvm_bench.measure import drift
+from hbvm_bench.measure.measured import Series
 from hbvm_bench.store.records import ErrorGrowth, Record
 from hbvm_bench.summaries import standings
 from hbvm_bench.summaries.frame import Frame
@@ -16,8 +16,7 @@ from hbvm_bench.summaries.points import by_family as families
 from hbvm_bench.summaries.points import number
 from hbvm_bench.summaries.rows import reached, seconds
 from hbvm_bench.summaries.table import NONE, Table
-
-Series = Mapping[str, NDArray[np.float64]]
+from integrators.protocol import Array
 
 SHORT = {
     "bounded": "bounded",
@@ -40,7 +39,7 @@ def clear(growth: ErrorGrowth) -> ErrorGrowth:
     return replace(growth, kind=None, why=from_few)
 
 
-def energy_errors(series: Series) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def energy_errors(series: Series) -> tuple[Array, Array]:
     """Return the times (n,) and the signed relative energy errors (starts, n) of a case; empty without."""
     if not {"drift.t", "drift.energy"} <= {*series}:
         return np.empty(0), np.empty((0, 0))

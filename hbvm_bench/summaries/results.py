@@ -2,12 +2,10 @@
 
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from hbvm_bench.store.store import opened
 from hbvm_bench.summaries import frame as frames
 from hbvm_bench.summaries.frame import Frame
+from integrators.protocol import Array
 from problems.errors import InputError, shown
 
 
@@ -44,7 +42,7 @@ class Results:
         """
         return frames.frame(self._stores, table)
 
-    def arrays(self, case: str) -> dict[str, NDArray[np.float64]]:
+    def arrays(self, case: str) -> dict[str, Array]:
         """Return the arrays of a case by name: times ``t`` (n,), states ``y`` (n, dim), and what was checked.
 
         A report has those alone that its figures are drawn from.

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.report.curves import GROWTH, PREFIX
@@ -18,8 +17,7 @@ from hbvm_bench.report.figures.style import MUTED, look, looks, shade
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries.points import family_of, is_hbvm_or_gauss, number
 from hbvm_bench.summaries.rows import group_of, reached
-
-Array = NDArray[np.float64]
+from integrators.protocol import Array
 
 POWERS = (-18, 4)  # an error beyond is no error but a failure, and is in the table
 DASHES = ("solid", "dashed", "dashdot", "dotted")  # of several settings of one family
