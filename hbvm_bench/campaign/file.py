@@ -6,7 +6,7 @@ import tomllib
 from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, get_args, get_type_hints
 
 import msgspec
 
@@ -263,25 +263,20 @@ def parse(text: str, source: str = "campaign") -> Campaign:
 
 
 def _check_keys(data: dict[str, Any], struct: type[msgspec.Struct], source: str) -> None:
+    kinds = get_type_hints(struct)
     for key, value in data.items():
-        if key not in struct.__struct_fields__:
-            raise InputError(f"{source}: {unknown('key', key, struct.__struct_fields__)}")
+        if key not in kinds:
+            raise InputError(f"{source}: {unknown('key', key, kinds)}")
         if key == "settings" and value not in get_args(Settings):
             raise InputError(f"{source}: {unknown('settings', str(value), get_args(Settings))}")
-        if key in NESTED:
-            for item in value if isinstance(value, list) else [value]:
-                if isinstance(item, dict):
-                    _check_keys(item, NESTED[key], source)
+        inner = _struct_in(kinds[key])
+        for item in value if isinstance(value, list) else [value]:
+            if inner is not None and isinstance(item, dict):
+                _check_keys(item, inner, source)
 
 
-NESTED: dict[str, type[msgspec.Struct]] = {
-    "grid": Grid,
-    "limits": Limits,
-    "timing": TimingPlan,
-    "checks": Checks,
-    "page": Page,
-    "problems": ProblemEntry,
-    "methods": MethodEntry,
-    "ensembles": EnsembleEntry,
-    "goals": Goal,
-}
+def _struct_in(kind: Any) -> type[msgspec.Struct] | None:
+    """Return the struct that a type is or has in it."""
+    if isinstance(kind, type) and issubclass(kind, msgspec.Struct):
+        return kind
+    return next(filter(None, map(_struct_in, get_args(kind))), None)

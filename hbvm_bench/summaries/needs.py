@@ -71,30 +71,19 @@ def needs(records: Sequence[Record]) -> list[Need]:
         if work == "warm_seconds"
         else "fewest evaluations (methods that do not count them are left out)"
     )
+    small = partial(Need, near=NEAR_ERROR, floor=ROUND_OFF)
     right, right_8 = _within(position_end=1e-4), _within(position_end=1e-8)
     exact, there = _within(position_end=1e-8, energy_max=1e-13), _within(position_end=1.0)
     return [
         Need(f"position error ≤ 1e-4, {cheaply}", right, work),
         Need(f"position error ≤ 1e-8, {cheaply}", right_8, work),
         Need(f"position error ≤ 1e-8 and energy error ≤ 1e-13, {cheaply}", exact, work),
-        Need("smallest position error at the end", there, "position_end", NEAR_ERROR, ROUND_OFF),
-        Need("smallest phase error at the end", there, "phase_end", NEAR_ERROR, ROUND_OFF),
-        Need("smallest energy error, with position error ≤ 1e-4", right, "energy_max", NEAR_ERROR, ROUND_OFF),
-        Need(
-            "smallest error of other invariants, with position error ≤ 1e-4",
-            right,
-            "invariants_max",
-            NEAR_ERROR,
-            ROUND_OFF,
-        ),
-        Need(
-            "smallest energy error among those bounded or growing as t^1/2",
-            _without_drift,
-            "energy_max",
-            NEAR_ERROR,
-            ROUND_OFF,
-        ),
-        Need("smallest time-reversal error", _within(), "reversal", NEAR_ERROR, ROUND_OFF),
+        small("smallest position error at the end", there, "position_end"),
+        small("smallest phase error at the end", there, "phase_end"),
+        small("smallest energy error, with position error ≤ 1e-4", right, "energy_max"),
+        small("smallest error of other invariants, with position error ≤ 1e-4", right, "invariants_max"),
+        small("smallest energy error among those bounded or growing as t^1/2", _without_drift, "energy_max"),
+        small("smallest time-reversal error", _within(), "reversal"),
         Need("least memory", _within(), "peak_memory", NEAR_MEMORY),
     ]
 
