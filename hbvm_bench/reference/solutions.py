@@ -226,14 +226,7 @@ def difference(stored: ReferenceFile, fresh: ReferenceFile) -> Decimal:
 
 def encode(stored: ReferenceFile) -> str:
     """Return the text of a reference file, one state a line."""
-    order = (
-        "problem",
-        "provenance",
-        "start",
-        "parameters",
-        "t",
-        *(["condition"] if stored.condition else []),
-    )
+    order = ("problem", "provenance", "start", "parameters", "t", *["condition"] * bool(stored.condition))
     lines = [f'"{key}": {_text(getattr(stored, key))}' for key in order]
     rows = ",\n".join(f"  {_text(row)}" for row in stored.y)
     return "{" + ",\n".join([*lines, f'"y": [\n{rows}\n]']) + "}\n"

@@ -11,7 +11,7 @@ between them. A list of links alone leads to other pages.
 """
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -138,21 +138,10 @@ def parsed(text: str, made: list[list[Block]]) -> tuple[str, list[str], list[Blo
     return title, lead, blocks
 
 
-def paragraphs(text: str) -> Iterator[str]:
-    """Yield the paragraphs of Markdown; headings, folds and marks are paragraphs without blank lines too."""
-    for part in re.split(r"\n\s*\n", text):
-        lines = part.strip("\n").split("\n")
-        plain: list[str] = []
-        for line in lines:
-            if re.match(r"#{1,4} |</?details>|\[\[block \d+\]\]$", line):
-                if plain:
-                    yield "\n".join(plain)
-                    plain = []
-                yield line.strip()
-            else:
-                plain.append(line)
-        if any(line.strip() for line in plain):
-            yield "\n".join(plain)
+def paragraphs(text: str) -> list[str]:
+    """Return the paragraphs of Markdown; headings, folds and marks are paragraphs without blank lines too."""
+    apart = re.sub(r"^(#{1,4} .*|</?details>.*|\[\[block \d+\]\])$", r"\n\1\n", text, flags=re.MULTILINE)
+    return [part.strip("\n").rstrip() for part in re.split(r"\n\s*\n", apart) if part.strip()]
 
 
 def _is_prose(blocks: Sequence[Block]) -> bool:

@@ -154,12 +154,11 @@ def log_axis(axes: Axes, which: str, low: int, high: int, *, most: int = 7) -> N
 
 def power_range(values: Iterable[NDArray[np.float64]], low: int, high: int) -> tuple[int, int]:
     """Return the powers of ten between which positive values lie, within ``low`` and ``high``."""
-    logs = [np.log10(v[(v > 0) & np.isfinite(v)]) for v in values]
-    logs = [log for log in logs if log.size]
-    if not logs:
+    together = np.concatenate([*values])
+    logs = np.log10(together[(together > 0) & np.isfinite(together)])
+    if not logs.size:
         return low, high
-    bottom = max(low, math.floor(min(float(log.min()) for log in logs)))
-    top = min(high, math.ceil(max(float(log.max()) for log in logs)))
+    bottom, top = max(low, math.floor(logs.min())), min(high, math.ceil(logs.max()))
     return min(bottom, high - 1), max(top, min(bottom, high - 1) + 1)
 
 

@@ -39,17 +39,14 @@ class OverTime:
     key: str
     title: str
     label: str  # of the axis, with its unit
-    values: str  # name of the curve; one that ends in a dot is the first that begins so
+    values: str  # with what the name of the curve begins
     caption: str
 
     def get(self, case: Drawn) -> Array | None:
         """Return times and values, shape (2, n), of a case; ``None`` where it has none."""
-        names = [
-            name
-            for name in case.curves
-            if (PREFIX + self.values) in (name, name[: len(PREFIX + self.values)])
-        ]
-        return case.curves[names[0]] if names and case.curves[names[0]].size else None
+        curves = (curve for name, curve in case.curves.items() if name.startswith(PREFIX + self.values))
+        first = next(curves, np.empty(0))
+        return first if first.size else None
 
 
 def telling(cases: Sequence[Drawn]) -> list[Drawn]:

@@ -9,6 +9,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 
+from matplotlib.colors import to_hex, to_rgb
+
 from hbvm_bench.summaries.points import PROJECTION
 
 # Of each family: its colour in the light and in the dark theme, and its marker.
@@ -95,9 +97,7 @@ def shade(colour: str, index: int, *, low: float = 0.16, high: float = 0.46) -> 
     """
     if index == 0:
         return colour
-    red, green, blue = (int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5))
-    hue, lightness, saturation = colorsys.rgb_to_hls(red, green, blue)
+    hue, lightness, saturation = colorsys.rgb_to_hls(*to_rgb(colour))
     step = 0.11 * ((abs(index) + 1) // 2)
     lightness += step if (index % 2 == 1) == (index > 0) else -step * 0.8
-    channels = colorsys.hls_to_rgb(hue, min(max(lightness, low), high), saturation)
-    return "#" + "".join(f"{round(255 * channel):02x}" for channel in channels)
+    return to_hex(colorsys.hls_to_rgb(hue, min(max(lightness, low), high), saturation))
