@@ -4,6 +4,7 @@ import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from functools import partial
+from typing import Any
 
 from msgspec.structs import replace
 
@@ -21,7 +22,6 @@ from hbvm_bench.report.document import (
     Links,
     Note,
     Notice,
-    Ranked,
     Section,
     attempt,
 )
@@ -76,16 +76,12 @@ def cost_ratio(
     return comparing.table(found, title, head)
 
 
-def ratios_drawn(
-    results: Results,
-    *,
-    key: str,
-    at: str = "",
-    level: str = "",
-    no_worse: Sequence[str] = (),
-) -> Picture | None:
-    """Draw the strongest other family on each problem, at one level of errors."""
-    return bars(comparing.ratios(results.frame, at, no_worse=no_worse), key, level)
+def ratios_drawn(results: Results, *, key: str, level: str = "", **options: Any) -> Picture | None:
+    """Draw the strongest other family on each problem, at one level of errors.
+
+    The other options are those of `hbvm_bench.summaries.cost_ratio.ratios`.
+    """
+    return bars(comparing.ratios(results.frame, **options), key, level)
 
 
 def fastest(results: Results, *, within: Mapping[str, float] | None = None) -> Table | None:
@@ -198,7 +194,7 @@ def what_came_out(results: Results) -> Section:
     elif len(tables) <= PROBLEMS_SUMMARIZED_AT_TOP:
         blocks += [
             Section(
-                _ranked(results, task, members).title,
+                ranked(task, members, results.known, tables).title,
                 _summary(task, members),
                 f"summary-{i}",
                 code=task.problem,
@@ -209,7 +205,7 @@ def what_came_out(results: Results) -> Section:
         titles = [
             title
             for task, members in tables.items()
-            for title, rows in _ranked(results, task, members).groups
+            for title, rows in ranked(task, members, results.known, tables).groups
             for _ in rows
         ]
         counts = Counter(re.split("[,:]", title)[0].lower() for title in titles)
@@ -223,15 +219,11 @@ def all_cases(results: Results) -> list[Block]:
     tables, shown = tasks(results.records), columns(results.records)
     said = [(item.short, item.unit or "–", f"{item.label}. {item.description}") for item in shown]
     meaning = Table("", ("column", "unit", "meaning"), said, words=(0, 1, 2))
-    problems = [_ranked(results, task, members, task.sampled(tables)) for task, members in tables.items()]
+    problems = [ranked(task, members, results.known, tables) for task, members in tables.items()]
     return [
         CaseTable(shown, problems, results.look, numbers(results.records)),
         Details("What the columns mean", [meaning]),
     ]
-
-
-def _ranked(results: Results, task: Task, records: Sequence[Record], sampled: str = "") -> Ranked:
-    return ranked(task, records, make_problem(task.problem, results.known), sampled)
 
 
 def _summary(task: Task, records: Sequence[Record]) -> list[Block]:
@@ -240,21 +232,18 @@ def _summary(task: Task, records: Sequence[Record]) -> list[Block]:
 
 def problems_in_turn(results: Results) -> list[Section]:
     """Return the section of each problem, with its figures."""
-    missing = [case for run in results.runs for case in results.missing(run)]
+    missing = grouped_by(
+        lambda case: Task.from_case(replace(case, problem=printed(case.problem))),
+        (case for run in results.runs for case in results.missing(run)),
+    )
     tables = tasks(results.records)
     return [
         section(
-            results.frame[results.frame.id.isin({record.id for record in members})],
-            results.series,
-            [
-                case
-                for case in missing
-                if Task.from_case(replace(case, problem=printed(case.problem))) == task
-            ],
-            number,
+            results,
+            ranked(task, members, results.known, tables),
             task,
-            results.known,
-            sampled=task.sampled(tables),
+            missing.get(task, []),
+            number,
             brief=len(tables) > BRIEF_PROBLEMS or len(results.records) > BRIEF_CASES,
             summary=_summary(task, members) if len(tables) > PROBLEMS_SUMMARIZED_AT_TOP else [],
         )

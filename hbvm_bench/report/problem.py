@@ -1,7 +1,7 @@
 """One problem's part of a report: sentences, rows and figures."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -19,6 +19,7 @@ from hbvm_bench.report.document import Block, Details, Items, Maker, Ranked, Sec
 from hbvm_bench.report.figures.canvas import Picture
 from hbvm_bench.report.figures.over_time import Drawn, OverTime, growth, over_time
 from hbvm_bench.report.figures.work_precision import work_precision
+from hbvm_bench.report.page import Results
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries.frame import Frame
 from hbvm_bench.summaries.points import number as number_of
@@ -60,9 +61,10 @@ OVER_TIME = (
 )
 
 
-def ranked(task: Task, records: Sequence[Record], problem: Problem, sampled: str = "") -> Ranked:
-    """Return the rows of one problem; ``sampled`` tells it from another part on it, by its samples."""
-    title = f"{problem.title}{at_once(task.ensemble)}{sampled}"
+def ranked(task: Task, records: Sequence[Record], known: Known, tables: Iterable[Task]) -> Ranked:
+    """Return the rows of one problem; the title tells it from others of the ``tables``."""
+    problem = make_problem(task.problem, known)
+    title = f"{problem.title}{at_once(task.ensemble)}{task.sampled(tables)}"
     return Ranked(title, short_name(task.problem), grouped(rows(records)))
 
 
@@ -75,35 +77,33 @@ def summary(task: Task, records: Sequence[Record]) -> Items:
 
 
 def section(
-    here: Frame,
-    series: Mapping[str, Mapping[str, Array]],
+    results: Results,
+    of: Ranked,
+    task: Task,
     missing: Sequence[Case],
     number: int,
-    task: Task,
-    known: Known,
     *,
     brief: bool,
     summary: Sequence[Block] = (),
-    sampled: str = "",
 ) -> Section:
     """Return what a report says about one problem, or about an ensemble of it.
 
-    ``here`` are its cases, with ``series``, and ``missing`` those that have no result yet. An ensemble's
-    series are over its trajectories and not over time: it has rows and no figures. ``brief`` draws only the
-    main figures.
+    ``of`` are its cases, and ``missing`` those that have no result yet. An ensemble's series are over its
+    trajectories and not over time: it has rows and no figures. ``brief`` draws only the main figures.
     """
+    ids = {row.record.id for _, rows_ in of.groups for row in rows_}
+    here, known = results.frame[results.frame.id.isin(ids)], results.known
     problem, records = make_problem(task.problem, known), list(here.record)
     unrun = Items([f"`{case.method}`" for case in missing])
     blocks: list[Block] = [
         *summary,
         *attempt((f"the reference of {task.problem}", partial(_reference, problem, known))),
         *([Details(f"{len(missing)} cases on this problem have no result yet", [unrun])] if missing else []),
-        *_figures(here, series, number, brief=brief),
+        *_figures(here, results.series, number, brief=brief),
         Section("Shortcomings of HBVM and Gauss", [Items(words.shortcomings(records))], f"wrong-{number}"),
     ]
-    title = ranked(task, records, problem, sampled).title
     nav = "Figures" * (number == 1)
-    return Section(title, blocks, f"problem-{number}", code=short_name(task.problem), nav=nav)
+    return Section(of.title, blocks, f"problem-{number}", code=of.problem, nav=nav)
 
 
 def _figures(
