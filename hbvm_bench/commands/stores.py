@@ -12,7 +12,7 @@ from rich.text import Text
 from hbvm_bench.report import terminal
 from hbvm_bench.store import merge as merging
 from hbvm_bench.store.files import ensure_writable
-from hbvm_bench.store.store import Store, opened
+from hbvm_bench.store.store import Store
 from hbvm_bench.summaries import compare as comparing
 from hbvm_bench.summaries import export as exporting
 from hbvm_bench.summaries.table import Table
@@ -96,5 +96,4 @@ def export(
 ) -> None:
     """Write a run as a flat table, for a spreadsheet or a data frame."""
     ensure_writable(out.parent)
-    exporting.ensure_known(out, table)  # before the run is opened
-    print(f"{exporting.export(opened([directory]), out, table)} rows in {out}")
+    print(f"{exporting.export([directory], out, table)} rows in {out}")

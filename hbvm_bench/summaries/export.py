@@ -9,25 +9,28 @@ import msgspec
 from hbvm_bench.measure.metrics import METRICS
 from hbvm_bench.store.files import atomic, spreadsheet_text
 from hbvm_bench.store.records import Record
-from hbvm_bench.store.store import Store
+from hbvm_bench.store.store import opened
 from hbvm_bench.summaries.frame import TABLES, frame
 from problems.errors import InputError, MissingLibraryError, unknown
 
 FORMATS = (".csv", ".parquet")
 
 
-def export(stores: Sequence[Store], path: Path, table: str = "cases") -> int:
-    """Write a `frame` to a file that ends in ``.csv`` or ``.parquet``; return the number of rows.
+def export(places: Sequence[Path], path: Path, table: str = "cases") -> int:
+    """Write a `frame` of runs to a file that ends in ``.csv`` or ``.parquet``; return the number of rows.
 
     Raises
     ------
     problems.errors.InputError
         For another ending or table, a place without a run or without arrays, or a missing library.
     """
-    ensure_known(path, table)
-    rows = frame(stores, table)
+    if table not in TABLES:  # before a run is opened
+        raise unknown("table", table, TABLES)
+    if path.suffix not in FORMATS:
+        raise InputError(f"{str(path)!r} must end in {' or '.join(FORMATS)}.")
+    rows = frame(opened(places), table)
     if table == "series" and rows.empty:
-        raise InputError(f"{str(stores[0].directory)!r} is a report, which has no series; export a run.")
+        raise InputError(f"{str(places[0])!r} is a report, which has no series; export a run.")
     with atomic(path) as temporary:
         if path.suffix == ".csv":
             texts = rows.select_dtypes("string").columns
@@ -42,20 +45,6 @@ def export(stores: Sequence[Store], path: Path, table: str = "cases") -> int:
                     "or write a .csv."
                 ) from None
     return len(rows)
-
-
-def ensure_known(path: Path, table: str) -> None:
-    """Refuse a table or the ending of a file that `export` does not know.
-
-    Raises
-    ------
-    problems.errors.InputError
-        With those that it knows.
-    """
-    if table not in TABLES:
-        raise unknown("table", table, TABLES)
-    if path.suffix not in FORMATS:
-        raise InputError(f"{str(path)!r} must end in {' or '.join(FORMATS)}.")
 
 
 def as_json(records: Sequence[Record]) -> dict[str, Any]:

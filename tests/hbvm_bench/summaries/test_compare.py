@@ -193,7 +193,7 @@ def test_the_merge_command_needs_two_runs(tmp_path, capsys):
 def test_an_exported_table_has_all_that_was_measured(tmp_path, ending):
     store = make(tmp_path / "a", edit=lambda i, r: with_value(r, "energy_max", 1 / 3))
     read = {"csv": _read_csv, "parquet": _read_parquet}[ending]
-    assert export([store], tmp_path / f"cases.{ending}") == 3
+    assert export([store.directory], tmp_path / f"cases.{ending}") == 3
     row = read(tmp_path / f"cases.{ending}")[1]
     assert row["method"] == "IAS15(epsilon=0.1)"
     assert row["method_options"] == '{"epsilon":0.1}'
@@ -201,10 +201,10 @@ def test_an_exported_table_has_all_that_was_measured(tmp_path, ending):
     assert int(row["time_samples"]) == 6
     assert row["t_stop"] in (None, "")
     assert set(METRICS) <= row.keys()
-    assert export([store], tmp_path / f"t.{ending}", "timings") == 18
+    assert export([store.directory], tmp_path / f"t.{ending}", "timings") == 18
     times = [float(row["seconds"]) for row in read(tmp_path / f"t.{ending}")[:6]]
     assert times == store.records()[0].timing.samples
-    assert export([store], tmp_path / f"s.{ending}", "series") == 54
+    assert export([store.directory], tmp_path / f"s.{ending}", "series") == 54
     last = read(tmp_path / f"s.{ending}")[14]
     assert (last["quantity"], int(last["component"]), float(last["t"])) == ("y", 3, 2.0)
     assert float(last["value"]) == 11 / 7
