@@ -25,9 +25,8 @@ from hbvm_bench.measure import machine
 from hbvm_bench.measure.measured import POSITION, position_error
 from hbvm_bench.measure.timing import busy, interleaved, load_between
 from hbvm_bench.report.markdown import printed
-from hbvm_bench.report.provenance import DIGITS
+from hbvm_bench.report.provenance import measured_on
 from hbvm_bench.store.records import Load
-from hbvm_bench.summaries import outcomes
 from hbvm_bench.summaries.table import Table
 from problems.catalogue.pendulum import exact_state
 from problems.problem import Problem
@@ -315,18 +314,17 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=5, help="how often each row is timed")
     parser.add_argument("--span", type=float, default=1e5, help="time units of the leak")
     asked, today = parser.parse_args(), datetime.now(UTC).date().isoformat()
-    measured = f"\nMeasured on {today} with the kernel {kernel_digest()[:DIGITS]}."
     if asked.host == "leak":
         print("| t | DOP853 | HBVM |\n|--:|--:|--:|")
         for t, errors in leak(asked.span):
             print(f"| {t:.0f} | {errors['DOP853']:.2e} | {errors['HBVM']:.2e} |", flush=True)
-        print(measured)
+        print(f"\n{measured_on(today, kernel_digest(), [])}")
         return
     rows, load = measure(asked.host, asked.rounds)
     print(printed(table(rows)))
     print(f"\n{POSITION} Here those are its start and its end.")
     print(f"\n{machine.sentence(machine.describe(measure=True))}")
-    print(measured, *([outcomes.other_work([load])] if load else []))
+    print(f"\n{measured_on(today, kernel_digest(), [load] if load else [])}")
 
 
 if __name__ == "__main__":

@@ -4,7 +4,8 @@ from collections.abc import Mapping, Sequence
 from datetime import datetime
 
 from hbvm_bench.measure import machine
-from hbvm_bench.store.records import Record
+from hbvm_bench.store.records import Load, Record
+from hbvm_bench.summaries import outcomes
 from hbvm_bench.summaries.table import Table
 from integrators.registry import libraries
 
@@ -15,6 +16,12 @@ def days(records: Sequence[Record]) -> str:
     """Return the days on which the cases ran: ``"2026-11-21"``, ``"2026-11-20 to 2026-11-21"``."""
     days_ = sorted({datetime.fromisoformat(r.finished).date().isoformat() for r in records if r.finished})
     return "" if not days_ else days_[0] if days_[0] == days_[-1] else f"{days_[0]} to {days_[-1]}"
+
+
+def measured_on(day: str, kernel: str, loads: Sequence[Load]) -> str:
+    """Say when something was measured, with which kernel, and beside what other work."""
+    beside = f" {outcomes.other_work(loads)}" if loads else ""
+    return f"Measured on {day} with the kernel {kernel[:DIGITS]}.{beside}"
 
 
 def versions(records: Sequence[Record]) -> dict[str, str]:
