@@ -17,16 +17,7 @@ from matplotlib.markers import MarkerStyle
 from matplotlib.transforms import Affine2D
 
 from hbvm_bench.measure.metrics import Metric
-from hbvm_bench.report.document import (
-    VERDICTS,
-    Block,
-    CaseTable,
-    Document,
-    Links,
-    Section,
-    is_call,
-    pieces,
-)
+from hbvm_bench.report.document import VERDICTS, Block, CaseTable, Document, Links, Section, is_call, pieces
 from hbvm_bench.report.figures.canvas import Picture
 from hbvm_bench.report.figures.style import DARK_NEUTRALS, NEUTRALS, Look
 from hbvm_bench.summaries.points import family_of

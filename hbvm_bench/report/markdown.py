@@ -50,10 +50,7 @@ def printed(block: Block, level: int = 2) -> str:
         case blocks.Section():
             title = words(block.title) + (f": {code(block.code)}" if block.code else "")
             return joined(
-                [
-                    f"{heading} {title}",
-                    *(printed(inner_block, level + 1) for inner_block in block.blocks),
-                ]
+                [f"{heading} {title}", *(printed(inner_block, level + 1) for inner_block in block.blocks)]
             )
         case Table():
             rows = [[cell(text) for text in row] for row in block.rows]

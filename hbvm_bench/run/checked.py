@@ -10,14 +10,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from hbvm_bench.campaign.entries import Page
-from hbvm_bench.campaign.file import (
-    Campaign,
-    EnsembleEntry,
-    Goal,
-    MethodEntry,
-    TimingPlan,
-    name_of,
-)
+from hbvm_bench.campaign.file import Campaign, EnsembleEntry, Goal, MethodEntry, TimingPlan, name_of
 from hbvm_bench.campaign.grid import Grid
 from hbvm_bench.campaign.identity import Resolved, is_ours
 from hbvm_bench.campaign.spec import parse_spec

@@ -60,10 +60,7 @@ def missing(planned: Sequence[Request], store: Store) -> list[Request]:
 
 
 def run(
-    planned: Sequence[Request],
-    store: Store,
-    pool: Pool,
-    tell: Callable[[Sequence[Request]], None],
+    planned: Sequence[Request], store: Store, pool: Pool, tell: Callable[[Sequence[Request]], None]
 ) -> Iterator[Record]:
     """Run computations side by side, then those that take times one by one here, and yield each row.
 

@@ -120,9 +120,7 @@ def _together(
     pairs = zip((case for case, _ in group), records, strict=True)
     on = [(case, record) for case, record in pairs if not record.result.violation]
     together = replace(
-        limits,
-        wall_seconds=limits.wall_seconds * len(on),
-        compile_seconds=limits.compile_seconds * len(on),
+        limits, wall_seconds=limits.wall_seconds * len(on), compile_seconds=limits.compile_seconds * len(on)
     )
     taken: dict[str, list[Timing]] = {case.id: [] for case, _ in on}
     left: set[str] = set()  # what takes no part in further rounds

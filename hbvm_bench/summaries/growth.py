@@ -18,12 +18,7 @@ from hbvm_bench.summaries.rows import reached, seconds
 from hbvm_bench.summaries.table import NONE, Table
 from integrators.protocol import Array
 
-SHORT = {
-    "bounded": "bounded",
-    "power": "t^a",
-    "exponential": "exp t",
-    "drift": "drift",
-}
+SHORT = {"bounded": "bounded", "power": "t^a", "exponential": "exp t", "drift": "drift"}
 """Every kind in a few signs, by the keys of `hbvm_bench.measure.drift.KINDS`; powers have exponents."""
 NOT_CLEAR = "not clear"
 COLUMNS = ("growth", "power of t", "mean", "per unit of time", "time", "× HBVM and Gauss")

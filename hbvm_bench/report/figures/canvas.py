@@ -87,13 +87,7 @@ def styled(draw: Callable[P, T]) -> Callable[P, T]:
 
 
 def picture(
-    figure: Figure,
-    key: str,
-    title: str,
-    caption: str,
-    summary: str,
-    *,
-    values: bool = False,
+    figure: Figure, key: str, title: str, caption: str, summary: str, *, values: bool = False
 ) -> Picture:
     """Render a figure; the same figure gives the same bytes."""
     svg = io.StringIO()
