@@ -104,7 +104,7 @@ LOOSE = ("speed", "by energy and position error", "Outer; 1e-08, 1e-05", "WHFast
 README_RATIOS = [
     ("0.23 times the time of Gauss", [LOOSE]),
     (
-        "heyoka is faster, by a factor of 2.9 to 4.3",
+        "heyoka is faster, by a factor of 3.2 to 5.9",
         [("general", "by position error", f"(DETEST C{i}); 1e-12", "Taylor") for i in (1, 2, 3, 4)],
     ),
 ]
