@@ -148,7 +148,7 @@ def log_axis(axes: Axes, which: str, low: int, high: int, *, most: int = 7) -> N
 
 def power_range(values: Iterable[NDArray[np.float64]], low: int, high: int) -> tuple[int, int]:
     """Return the powers of ten between which positive values lie, within ``low`` and ``high``."""
-    together = np.concatenate([*values])
+    together = np.concatenate([np.empty(0), *values])
     logs = np.log10(together[(together > 0) & np.isfinite(together)])
     if not logs.size:
         return low, high
