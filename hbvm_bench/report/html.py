@@ -11,6 +11,7 @@ from functools import cache
 from importlib.resources import files
 
 import msgspec
+import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 from matplotlib.markers import MarkerStyle
@@ -251,7 +252,7 @@ def shape(marker: str) -> str:
     """Return a marker of the figures as the path of an SVG, in a box of 12 by 12."""
     style = MarkerStyle(marker)
     path = style.get_path().transformed(style.get_transform() + Affine2D().scale(8, -8).translate(6, 6))
-    lines = ("L".join(f"{x:.1f} {y:.1f}" for x, y in line) for line in path.to_polygons())
+    lines = ("L".join(f"{x:.1f} {y:.1f}" for x, y in np.asarray(line)) for line in path.to_polygons())
     return "".join(f"M{line}z" for line in lines)
 
 
