@@ -123,7 +123,7 @@ def growth(cases: Sequence[Drawn], key: str = "growth") -> Picture | None:
     log_axis(axes, "x", math.floor(math.log10(times.min())), math.ceil(math.log10(times.max())))
     log_axis(axes, "y", low, high)
     alone = len({family_of(case.record) for case in shown}) == len(shown)
-    names = [family_of(case.record) if alone else cut(case.record.case.method) for case in shown]
+    names = [family_of(case.record) for case in shown] if alone else [*map(cut, told_apart(shown))]
     counted: Counter[str] = Counter()
     ends, said = [], []
     for case, name, (t, rms, least, most) in zip(shown, names, drawn, strict=True):
@@ -156,6 +156,18 @@ def _axes(title: str, problem: str) -> tuple[Figure, Axes]:
     return figure, axes
 
 
-def cut(text: str, room: int = 22) -> str:
+def told_apart(cases: Sequence[Drawn]) -> list[str]:
+    """Return the methods without the arguments that all settings of a method have: ``"Gauss h=1.0"``."""
+    specs = [parse_spec(case.record.case.method) for case in cases]
+    names = []
+    for spec in specs:
+        alike = [other.arguments.items() for other in specs if other.name == spec.name]
+        own = [item for item in spec.arguments.items() if not all(item in each for each in alike)]
+        said = ", ".join(key if value is True else f"{key}={value}" for key, value in own)
+        names.append(f"{spec.name} {said}".strip())
+    return names
+
+
+def cut(text: str, room: int = 24) -> str:
     """Return as much of a text as has room beside its line."""
     return text if len(text) <= room else text[: room - 1] + "…"
