@@ -150,7 +150,7 @@ def growth(cases: Sequence[Drawn], key: str = "growth") -> Picture | None:
 
 def _axes(title: str, problem: str) -> tuple[Figure, Axes]:
     figure = new(WIDTH, 3.3)
-    axes = figure.add_axes((0.12, 0.15, 0.64, 0.76))
+    axes = figure.add_axes((0.12, 0.15, 0.6, 0.76))
     axes.set_title(title, fontweight="normal")
     axes.set_xlabel(time_label(problem))
     return figure, axes
