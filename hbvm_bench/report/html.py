@@ -46,6 +46,7 @@ class Place:
     level: int  # of the next heading
     colours: Mapping[str, str]  # from the colour of a case to the name of the page's variable
     inlined: Collection[str]  # keys of the figures that stand in the text; the others are in its data
+    anchors: Collection[str]  # keys of the sections that the page has
 
     @property
     def below(self) -> "Place":
@@ -109,7 +110,8 @@ def page(document: Document, ways: Mapping[str, str] | None = None) -> str:
     looks = document.looks
     script = "".join(text(name) for name in SCRIPTS)
     light = {f"--m{look.number}": look.light for look in looks}
-    top = Place(2, {colour: name for name, colour in light.items()}, _within(document.pictures))
+    anchors = {block.key for block in document.walk() if isinstance(block, Section)}
+    top = Place(2, {colour: name for name, colour in light.items()}, _within(document.pictures), anchors)
     waiting = [picture for picture in document.pictures if picture.key not in top.inlined]
     parts = {
         "nav": [block for block in document.walk() if isinstance(block, Section) and block.nav],

@@ -41,7 +41,7 @@ from tests.hbvm_bench import made_up_run
 
 REPORTS = Path(__file__).parents[3] / "reports"
 HOSTILE = 'a <script>alert("x")</script> | `code` & 3.4e-15\nnext'
-TOP = Place(2, {}, {"drawn"})
+TOP = Place(2, {}, {"drawn"}, set())
 
 
 class Tags(HTMLParser):
