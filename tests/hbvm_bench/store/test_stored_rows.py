@@ -93,7 +93,7 @@ def test_a_report_is_exported_as_a_table_and_has_no_series(tmp_path, capsys):
     out = tmp_path / "cases.csv"
     assert main(["export", str(SITNIKOV), "-o", str(out)]) == 0
     assert f"28 rows in {out}" in capsys.readouterr().out
-    assert main(["export", str(REPORTS / "random"), "-o", str(out), "--table", "series"]) == 2
+    assert main(["export", str(REPORTS / "many" / "ensemble"), "-o", str(out), "--table", "series"]) == 2
     assert "is a report, which has no series" in capsys.readouterr().err
 
 
